@@ -1,0 +1,70 @@
+"""Every exception this library raises on purpose.
+
+The tree::
+
+    UniLaviraError
+    ├── InputError            a person's input is wrong (exit code 2)
+    │   ├── ScenarioError     a scenario file, overlay or flag
+    │   └── TaskError         a task text, start or goal
+    ├── InfrastructureError   the machine or a service is not able (exit code 3)
+    │   ├── RenderingError    no usable renderer
+    │   └── MllmError         the model could not be reached or answered with an error
+    │       └── MllmTimeout   no reply before the deadline
+    ├── ReplyFormatError      a model's reply is not what was asked for (handled by a re-ask)
+    └── PortTypeError         a port carries another type than its reader expects (a wiring bug)
+
+Inside the control loop expected failures are values (a status on a port); only bugs raise.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class UniLaviraError(Exception):
+    """Base class of every deliberate error of this library."""
+
+
+class InputError(UniLaviraError):
+    """A person's input is wrong: the message names the place, the value and the remedy."""
+
+
+class ScenarioError(InputError):
+    """A scenario file, overlay or command-line flag cannot be used."""
+
+
+class TaskError(InputError):
+    """A task text, start or goal cannot be used."""
+
+
+class InfrastructureError(UniLaviraError):
+    """The machine or a service is not able to run the episode; never the agent's failure."""
+
+
+class RenderingError(InfrastructureError):
+    """No renderer works on this machine."""
+
+
+class MllmError(InfrastructureError):
+    """A model could not be reached, or answered with an error instead of a reply."""
+
+
+class MllmTimeout(MllmError):
+    """A model gave no reply before its deadline."""
+
+
+class ReplyFormatError(UniLaviraError):
+    """A model's reply does not have the form that was asked for."""
+
+
+class PortTypeError(UniLaviraError, TypeError):
+    """A port is unconnected, or carries another type than its reader expects."""
+
+
+def unknown_name(kind: str, name: str, valid: Iterable[str], place: str) -> str:
+    """Returns a message for an unknown name, with the nearest valid one as the remedy."""
+    names = sorted(valid)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    remedy = f"did you mean {near[0]!r}? " if near else ""
+    return f"{place}: unknown {kind} {name!r}; {remedy}valid: {', '.join(names) or 'none'}."

@@ -1,0 +1,66 @@
+"""The frozen values that travel on ports."""
+
+from unilavira_drake.messages.actions import (
+    CALLS,
+    TOOLS,
+    LanguageAction,
+    TodoUpdate,
+    VisionAction,
+)
+from unilavira_drake.messages.frozen import Message, read_only
+from unilavira_drake.messages.memory import (
+    DecisionRecord,
+    Edge,
+    History,
+    SecondChance,
+    TodoItem,
+    TodoList,
+    Waypoint,
+)
+from unilavira_drake.messages.observation import (
+    DIRECTIONS,
+    SWEEP_ORDER,
+    VIEW_YAW,
+    Frame,
+    Intrinsics,
+    Outcome,
+    Panorama,
+    Sweep,
+)
+from unilavira_drake.messages.plans import (
+    TERMINAL_STATES,
+    Goal,
+    NavigationStatus,
+    OccupancyMap,
+    Path,
+)
+
+__all__ = [
+    "CALLS",
+    "DIRECTIONS",
+    "SWEEP_ORDER",
+    "TERMINAL_STATES",
+    "TOOLS",
+    "VIEW_YAW",
+    "DecisionRecord",
+    "Edge",
+    "Frame",
+    "Goal",
+    "History",
+    "Intrinsics",
+    "LanguageAction",
+    "Message",
+    "NavigationStatus",
+    "OccupancyMap",
+    "Outcome",
+    "Panorama",
+    "Path",
+    "SecondChance",
+    "Sweep",
+    "TodoItem",
+    "TodoList",
+    "TodoUpdate",
+    "VisionAction",
+    "Waypoint",
+    "read_only",
+]

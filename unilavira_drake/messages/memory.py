@@ -1,0 +1,116 @@
+"""What the agent remembers: the TODO list (TDM), waypoints and second chances (SCB)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from unilavira_drake.messages.frozen import Message
+
+
+@dataclass(frozen=True)
+class TodoItem(Message):
+    """One sub-goal (paper Eq. 4): content, ``pending`` | ``completed``, and the evidence."""
+
+    content: str = ""
+    status: str = "pending"
+    result: str = ""
+
+
+@dataclass(frozen=True)
+class TodoList(Message):
+    """The list after the updates of language action ``n``, and what was wrong with them."""
+
+    n: int = 0
+    items: tuple[TodoItem, ...] = ()
+    feedback: tuple[str, ...] = ()
+    """One sentence for each operation that was refused or rolled back."""
+
+
+@dataclass(frozen=True)
+class Waypoint(Message):
+    """A place where a panorama was captured."""
+
+    id: int = 0
+    n: int = 0
+    """Number of the panorama first captured here."""
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """In the world, metres."""
+    heading: float = 0.0
+    """World yaw of this waypoint's ``front`` view, radians."""
+    target_desc: str = ""
+    """The vision action that led here."""
+    scene: str = ""
+    """The language model's sentence about the place."""
+    thumbnail: bytes = b""
+    """The front view as a small JPEG."""
+
+    @property
+    def caption(self) -> str:
+        """Target and scene in one line of at most 160 characters; quoted as data in prompts."""
+        text = "; ".join(part for part in (self.target_desc, self.scene) if part)
+        return text if len(text) <= 160 else text[:159] + "…"
+
+
+@dataclass(frozen=True)
+class Edge(Message):
+    """A direction tried from a waypoint and how it ended."""
+
+    waypoint: int = 0
+    direction: str = ""
+    bearing: float = 0.0
+    """World bearing of the direction, radians."""
+    n: int = 0
+    """Number of the language action that took it."""
+    outcome: str = ""
+    """``arrived``, ``failed: ...`` or ``returned`` (left again by a backtrack)."""
+    to: int | None = None
+    """The waypoint it led to; None when it did not arrive."""
+
+
+@dataclass(frozen=True)
+class DecisionRecord(Message):
+    """One past language action as the history tells it."""
+
+    n: int = 0
+    call: str = ""
+    tool: str = ""
+    argument: str = ""
+    waypoint: int = 0
+    """Where it was taken."""
+    target_desc: str = ""
+    outcome: str = ""
+
+
+@dataclass(frozen=True)
+class History(Message):
+    """H_t of the paper: waypoints, edges, past decisions and key frames up to panorama ``n``."""
+
+    n: int = 0
+    current: int = 0
+    """The waypoint at which panorama ``n`` was captured."""
+    waypoints: tuple[Waypoint, ...] = ()
+    edges: tuple[Edge, ...] = ()
+    decisions: tuple[DecisionRecord, ...] = ()
+    keyframes: tuple[bytes, ...] = ()
+    """Egocentric JPEG frames of the latest leg, oldest first."""
+
+    def waypoint(self, waypoint_id: int) -> Waypoint | None:
+        """Returns the waypoint with this id, or None when it is unknown or was evicted."""
+        for waypoint in self.waypoints:
+            if waypoint.id == waypoint_id:
+                return waypoint
+        return None
+
+
+@dataclass(frozen=True)
+class SecondChance(Message):
+    """What Second Chance Backtrack adds to the prompt of call ``n``."""
+
+    n: int = 0
+    offers: tuple[int, ...] = ()
+    """Waypoints to which the robot may drive back."""
+    failed_edges: tuple[Edge, ...] = ()
+    failed_direction: str = ""
+    """On arrival after a backtrack: the direction that failed from here, else empty."""
+    failed_frames: tuple[bytes, ...] = ()
+    """On arrival after a backtrack: egocentric JPEG frames of the failed leg, oldest first."""

@@ -1,0 +1,98 @@
+"""Where to go and how it goes: goal, map, path and navigation status."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.messages.frozen import Message, read_only
+
+TERMINAL_STATES = ("arrived", "failed")
+
+
+@dataclass(frozen=True)
+class Goal(Message):
+    """The one goal of language action ``n``: ``go`` to ``p_WG``, ``stay``, or ``none`` with a
+    reason.  ``heading``, when given, is the world yaw at which the next sweep starts."""
+
+    n: int = 0
+    kind: str = "stay"
+    p_WG: tuple[float, float, float] | None = None
+    heading: float | None = None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class NavigationStatus(Message):
+    """How goal ``n`` goes: ``moving``, ``arrived`` or ``failed`` and why.
+
+    The initial value (0, arrived) starts the ring.
+    """
+
+    n: int = 0
+    state: str = "arrived"
+    reason: str = ""
+    heading: float | None = None
+
+    @property
+    def terminal(self) -> bool:
+        """Whether goal ``n`` is done."""
+        return self.state in TERMINAL_STATES
+
+
+@dataclass(frozen=True, eq=False)
+class Path(Message):
+    """A polyline on the floor for goal ``n``; empty once the goal is done."""
+
+    n: int = 0
+    version: int = 0
+    """Counts the replans of this goal."""
+    p_WP: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    """(k, 2) float64, metres in the world, from the robot to the goal."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "p_WP", read_only(self.p_WP))
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyMap(Message):
+    """Log-odds of occupancy on a horizontal grid.
+
+    Cell (row i, column j) covers x in [x0 + j r, x0 + (j + 1) r) and y in
+    [y0 + i r, y0 + (i + 1) r).  0 is unknown, negative free, positive occupied.
+    """
+
+    n: int = 0
+    """Number of the latest panorama that is part of this map."""
+    version: int = 0
+    time: float = 0.0
+    resolution: float = 0.05
+    """Side of a cell, metres."""
+    origin: tuple[float, float] = (0.0, 0.0)
+    """World (x0, y0) of the corner of cell (0, 0), metres; multiples of the resolution."""
+    log_odds: NDArray[np.int8] = field(default_factory=lambda: np.zeros((1, 1), np.int8))
+    """(rows, columns) int8."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "log_odds", read_only(self.log_odds))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.log_odds.shape[0], self.log_odds.shape[1]
+
+    def cell(self, x: float, y: float) -> tuple[int, int]:
+        """Returns (row, column) of a world point; it may lie outside the grid."""
+        return (
+            int(np.floor((y - self.origin[1]) / self.resolution)),
+            int(np.floor((x - self.origin[0]) / self.resolution)),
+        )
+
+    def center(self, row: int, column: int) -> tuple[float, float]:
+        """Returns the world (x, y) of a cell's centre, metres."""
+        return (
+            self.origin[0] + (column + 0.5) * self.resolution,
+            self.origin[1] + (row + 0.5) * self.resolution,
+        )

@@ -1,0 +1,1 @@
+"""Worlds: what stands where, and how it becomes geometry."""
