@@ -26,6 +26,7 @@ from unilavira_drake.messages.observation import (
     Outcome,
     Panorama,
     Sweep,
+    direction_of,
 )
 from unilavira_drake.messages.plans import (
     TERMINAL_STATES,
@@ -62,5 +63,6 @@ __all__ = [
     "TodoUpdate",
     "VisionAction",
     "Waypoint",
+    "direction_of",
     "read_only",
 ]

@@ -47,6 +47,8 @@ class LanguageAction(Message):
     reason: str = ""
     """Why a stop was rejected, or why there is no action."""
     answer: str = ""
+    fallback: bool = False
+    """Whether the documented safe action took the place of unusable replies."""
 
     @property
     def argument(self) -> str:
@@ -72,3 +74,5 @@ class VisionAction(Message):
     confidence: float | None = None
     reason: str = ""
     """Why nothing was selected; empty when a box or a point was."""
+    fallback: bool = False
+    """Whether unusable replies left nothing to select."""

@@ -20,6 +20,11 @@ SWEEP_ORDER = ("front", "left", "back", "right")
 """The order in which a robot with one camera captures the views, turning to its left."""
 
 
+def direction_of(bearing: float) -> str:
+    """Returns the word nearest to a bearing to the left of ``front``, radians."""
+    return min(DIRECTIONS, key=lambda d: abs(math.remainder(bearing - VIEW_YAW[d], 2 * math.pi)))
+
+
 @dataclass(frozen=True)
 class Intrinsics(Message):
     """A pinhole camera: image size in pixels, focal lengths and principal point in pixels."""

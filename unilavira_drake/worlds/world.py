@@ -41,6 +41,8 @@ class Room(Message):
     kind: str = ""
     rectangle: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
     """(x_min, y_min, x_max, y_max) between the walls' centre lines, metres."""
+    floor_color: tuple[float, float, float] = (0.7, 0.7, 0.7)
+    """Red, green, blue of the floor, each in [0, 1]."""
 
     def contains(self, x: float, y: float) -> bool:
         """Whether a point of the floor lies in this room."""
@@ -88,6 +90,12 @@ class World(Message):
     walls: tuple[Box, ...] = ()
     labels: dict[int, LabelEntry] = field(default_factory=dict)
     """Render label -> meaning; every labelled geometry has an entry."""
+    wall_height: float = 2.6
+    """Metres; the ceiling lies there."""
+    wall_color: tuple[float, float, float] = (0.9, 0.9, 0.9)
+    """Red, green, blue of walls and ceiling, each in [0, 1]."""
+    mirrored: bool = False
+    """Whether y was negated when the world was read; starts and goals given as numbers follow."""
 
     def room_at(self, x: float, y: float) -> Room | None:
         """Returns the room that holds a point of the floor, or None outside."""

@@ -1,0 +1,120 @@
+"""The waypoint memory as a pure function: places, edges, second chances."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from unilavira_drake.memory.waypoints import MemoryBounds, WaypointState, remember
+from unilavira_drake.messages import LanguageAction, Outcome, Panorama, VisionAction
+
+BOUNDS = MemoryBounds(waypoints=4, decisions=3, keyframes=2, merge_distance=0.5)
+
+
+def panorama(n: int, x: float, y: float, yaw: float = 0.0, **fields: object) -> Panorama:
+    X_WB = np.eye(4)
+    c, s = math.cos(yaw), math.sin(yaw)
+    X_WB[:2, :2] = [[c, -s], [s, c]]
+    X_WB[:2, 3] = x, y
+    return Panorama(n=n, first=fields.pop("first", n), X_WB=X_WB, **fields)  # type: ignore[arg-type]
+
+
+def turn(n: int, direction: str, scene: str = "") -> LanguageAction:
+    return LanguageAction(n=n, call="decide", tool="turn", direction=direction, scene=scene)
+
+
+def step(
+    state: WaypointState,
+    view: Panorama,
+    action: LanguageAction = LanguageAction(),
+    target: str = "",
+) -> WaypointState:
+    vision = VisionAction(n=action.n, target_desc=target)
+    return remember(state, view, action, vision, b"thumbnail", BOUNDS)
+
+
+def test_first_panorama_makes_the_first_waypoint() -> None:
+    state = step(WaypointState(), panorama(1, 2.0, 3.0, yaw=0.5))
+    (waypoint,) = state.history.waypoints
+    assert (waypoint.id, waypoint.n, waypoint.position[:2]) == (1, 1, (2.0, 3.0))
+    assert waypoint.heading == pytest.approx(0.5)
+    assert state.history.n == state.second_chance.n == 1
+    assert state.second_chance.offers == ()
+
+
+def test_edge_caption_and_offer_of_a_drive() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0, yaw=1.0))
+    state = step(state, panorama(2, 0, 4), turn(1, "left", scene="a bedroom"), target="white door")
+    assert [w.caption for w in state.history.waypoints] == ["a bedroom", "white door"]
+    (edge,) = state.history.edges
+    assert (edge.waypoint, edge.direction, edge.to, edge.outcome) == (1, "left", 2, "arrived")
+    assert edge.bearing == pytest.approx(1.0 + math.pi / 2)
+    assert state.second_chance.offers == (1,)
+    assert state.history.decisions[-1].target_desc == "white door"
+
+
+def test_near_place_is_the_same_waypoint() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    state = step(state, panorama(2, 3, 0), turn(1, "front"))
+    state = step(state, panorama(3, 0.3, 0.2), turn(2, "back"))
+    assert state.history.current == 1
+    assert len(state.history.waypoints) == 2
+
+
+def test_reissued_panorama_adds_nothing_but_a_failed_edge() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    blocked = panorama(2, 0, 0, first=1, outcome=Outcome("failed", "unreachable"))
+    state = step(state, blocked, turn(1, "right"))
+    assert len(state.history.waypoints) == 1
+    (edge,) = state.second_chance.failed_edges
+    assert (edge.waypoint, edge.direction, edge.to) == (1, "right", None)
+    assert edge.outcome == "failed: unreachable"
+
+
+def test_arrived_backtrack_names_the_failed_direction_and_its_frames() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    state = WaypointState(**{**vars(state), "frames": (b"leg1",)})
+    state = step(state, panorama(2, 3, 0), turn(1, "front"))
+    state = WaypointState(**{**vars(state), "frames": (b"leg2a", b"leg2b")})
+    state = step(state, panorama(3, 3, 3), turn(2, "left"))
+    state = WaypointState(**{**vars(state), "frames": (b"way back",)})
+    back = LanguageAction(n=3, call="decide", tool="backtrack", waypoint=1)
+    state = step(state, panorama(4, 0, 0), back)
+    chance = state.second_chance
+    assert chance.failed_direction == "front"
+    assert chance.failed_frames == (b"leg2a", b"leg2b")
+    assert [e.outcome for e in chance.failed_edges] == ["returned"]
+    assert state.history.current == 1
+
+
+def test_failed_direction_is_told_in_the_words_of_the_present_panorama() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    state = step(state, panorama(2, 3, 0), turn(1, "front"))
+    back = LanguageAction(n=2, call="decide", tool="backtrack", waypoint=1)
+    state = step(state, panorama(3, 0, 0, yaw=math.pi / 2), back)
+    assert state.second_chance.failed_direction == "right"
+
+
+def test_backtrack_that_did_not_arrive_marks_no_edge() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    state = step(state, panorama(2, 3, 0), turn(1, "front"))
+    back = LanguageAction(n=2, call="decide", tool="backtrack", waypoint=1)
+    state = step(state, panorama(3, 2, 0, outcome=Outcome("failed", "stuck")), back)
+    assert state.second_chance.failed_direction == ""
+    assert state.second_chance.failed_edges == ()
+
+
+def test_buffer_is_bounded_and_keeps_the_start() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    for n in range(2, 8):
+        state = step(state, panorama(n, 3.0 * n, 0), turn(n - 1, "front"))
+    assert [w.id for w in state.history.waypoints] == [1, 5, 6, 7]
+    assert len(state.history.decisions) == BOUNDS.decisions
+
+
+def test_caption_is_at_most_160_characters() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    state = step(state, panorama(2, 3, 0), turn(1, "front", scene="x" * 400))
+    assert len(state.history.waypoints[0].caption) == 160

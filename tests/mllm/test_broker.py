@@ -1,0 +1,182 @@
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from unilavira_drake.errors import MllmError, MllmTimeout
+from unilavira_drake.mllm.broker import Broker
+from unilavira_drake.mllm.request import Completion, MllmRequest
+
+
+class Backend:
+    """Answers with ``reply``; remembers what it was asked, and by which threads."""
+
+    name = "test"
+    perception = "images"
+    reasoning = "model"
+    description = "A test's own model."
+
+    def __init__(self, reply: Callable[[MllmRequest], str]) -> None:
+        self.asked: list[MllmRequest] = []
+        self.threads: set[threading.Thread] = set()
+        self._reply = reply
+
+    def complete(self, request: MllmRequest) -> Completion:
+        self.asked.append(request)
+        self.threads.add(threading.current_thread())
+        return Completion(text=self._reply(request))
+
+
+@pytest.fixture
+def gate() -> Iterator[threading.Event]:
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+def _raise(error: Exception) -> Callable[[MllmRequest], str]:
+    def reply(request: MllmRequest) -> str:
+        raise error
+
+    return reply
+
+
+def test_each_request_is_called_once() -> None:
+    backend = Backend(lambda request: f"{request.n}.{request.attempt}")
+    broker = Broker(backend, max_workers=2, deadline=10.0)
+    requests = [MllmRequest(n=n, attempt=a) for n in (1, 2, 3) for a in (0, 1)]
+    for request in requests * 3:
+        broker.submit(request)
+    assert [broker.result(request).text for request in requests] == [
+        "1.0", "1.1", "2.0", "2.1", "3.0", "3.1",
+    ]  # fmt: skip
+    assert broker.calls == len(backend.asked) == 6
+    # An equal request, made anew, is the same call; another seed is another one.
+    assert broker.result(MllmRequest(n=1)).text == "1.0"
+    assert broker.calls == 6
+    broker.result(MllmRequest(n=1, seed=1))
+    assert broker.calls == 7
+
+
+def test_never_more_workers_than_allowed(gate: threading.Event) -> None:
+    running, most, lock = 0, 0, threading.Lock()
+    both_in = threading.Barrier(2)
+
+    def reply(request: MllmRequest) -> str:
+        nonlocal running, most
+        with lock:
+            running += 1
+            most = max(most, running)
+        both_in.wait(10.0)
+        with lock:
+            running -= 1
+        return ""
+
+    broker = Broker(Backend(reply), max_workers=2, deadline=10.0)
+    requests = [MllmRequest(n=n) for n in range(1, 9)]
+    for request in requests:
+        broker.submit(request)
+    for request in requests:
+        broker.result(request)
+    assert most == 2
+
+
+def test_a_submitted_call_runs_before_it_is_joined() -> None:
+    called = threading.Event()
+    broker = Broker(Backend(lambda request: str(called.set())))
+    broker.submit(MllmRequest(n=1))
+    assert called.wait(10.0)
+
+
+def test_an_error_is_remembered() -> None:
+    backend = Backend(_raise(MllmError("refused")))
+    broker = Broker(backend)
+    for _ in range(2):
+        with pytest.raises(MllmError, match="refused"):
+            broker.result(MllmRequest(n=1))
+    assert broker.calls == 1
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("bug"), TimeoutError("bug")])
+def test_a_bug_of_the_backend_is_raised_as_it_is(error: Exception) -> None:
+    broker = Broker(Backend(_raise(error)))
+    with pytest.raises(type(error), match="bug"):
+        broker.result(MllmRequest(n=1))
+
+
+def test_deadline_is_remembered_and_a_late_reply_ignored(gate: threading.Event) -> None:
+    backend = Backend(lambda request: str(gate.wait(10.0)))
+    broker = Broker(backend, deadline=0.05)
+    with pytest.raises(MllmTimeout, match=r"no reply within 0\.05 s"):
+        broker.result(MllmRequest(n=1))
+    gate.set()
+    for thread in backend.threads:
+        thread.join(10.0)
+    with pytest.raises(MllmTimeout):
+        broker.result(MllmRequest(n=1))
+    assert broker.calls == 1
+
+
+def test_a_call_whose_reader_gave_up_is_not_made(gate: threading.Event) -> None:
+    backend = Backend(lambda request: str(gate.wait(10.0)))
+    broker = Broker(backend, max_workers=1, deadline=0.05)
+    for n in (1, 2):
+        with pytest.raises(MllmTimeout):
+            broker.result(MllmRequest(n=n))
+    gate.set()
+    for thread in list(broker._workers):
+        thread.join(10.0)
+    assert broker.calls == 1
+
+
+def test_workers_end_when_there_is_nothing_to_do() -> None:
+    backend = Backend(lambda request: "")
+    broker = Broker(backend)
+    broker.result(MllmRequest(n=1))
+    for thread in backend.threads:
+        assert thread.daemon
+        thread.join(10.0)
+        assert not thread.is_alive()
+
+
+def test_close_settles_open_calls_and_keeps_replies(gate: threading.Event) -> None:
+    def reply(request: MllmRequest) -> str:
+        return "early" if request.n == 1 else str(gate.wait(0.2))
+
+    backend = Backend(reply)
+    broker = Broker(backend, max_workers=1, deadline=10.0)
+    assert broker.result(MllmRequest(n=1)).text == "early"
+    for n in (2, 3):
+        broker.submit(MllmRequest(n=n))
+    broker.close()
+    broker.close()
+    assert broker.result(MllmRequest(n=1)).text == "early"
+    for n in (2, 3, 4):
+        with pytest.raises(MllmError, match="closed"):
+            broker.result(MllmRequest(n=n))
+    assert not any(thread.is_alive() for thread in backend.threads)
+    assert 3 not in [request.n for request in backend.asked]
+
+
+def test_close_wakes_a_reader(gate: threading.Event) -> None:
+    broker = Broker(Backend(lambda request: str(gate.wait(10.0))), deadline=10.0)
+    caught: list[BaseException] = []
+
+    def read() -> None:
+        try:
+            broker.result(MllmRequest(n=1))
+        except MllmError as error:
+            caught.append(error)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    while not broker.calls:
+        pass
+    closer = threading.Thread(target=broker.close)
+    closer.start()
+    reader.join(10.0)
+    gate.set()
+    closer.join(10.0)
+    assert "closed" in str(caught[0])

@@ -1,0 +1,122 @@
+"""The agent: language, memories, vision and goal selector in one Diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, MutableMapping
+from dataclasses import dataclass
+
+from pydrake.systems.framework import Diagram, System
+
+from unilavira_drake.language.system import Language
+from unilavira_drake.mapping.goal_selector import GoalSelector
+from unilavira_drake.memory.todo_system import TodoMemory
+from unilavira_drake.memory.waypoint_system import WaypointMemory
+from unilavira_drake.messages import Frame
+from unilavira_drake.mllm.broker import Broker
+from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.mllm.request import Mllm
+from unilavira_drake.model_link import Latency, ModelLink
+from unilavira_drake.scenario import MemoryConfig
+from unilavira_drake.vision.system import Vision
+from unilavira_drake.wiring import Wiring
+
+ABLATIONS = ("full", "no_tdm", "no_scb", "no_both")
+
+
+@dataclass(frozen=True)
+class ModelChoice:
+    """A model and how long it thinks."""
+
+    backend: Mllm
+    latency: Latency
+
+
+def make_agent(
+    *,
+    language_model: ModelChoice,
+    vision_model: ModelChoice,
+    memory: MemoryConfig,
+    ablation: str,
+    tick: float,
+    seed: int,
+    can_climb: bool,
+    free_distance: Callable[[Frame], float],
+    detector: Callable[[Frame], ViewEvidence],
+    replace: MutableMapping[str, System] | None = None,
+) -> Diagram:
+    """Returns the agent; it is the same for every robot.
+
+    An ablation is wiring: without TDM ``todo_list`` stays unconnected, without SCB
+    ``second_chance`` does.  The detector reaches a level only when its model declares
+    ``perception: ground_truth``.
+    """
+    wiring = Wiring(replace)
+
+    def evidence(model: ModelChoice) -> Callable[[Frame], ViewEvidence] | None:
+        return detector if model.backend.perception == "ground_truth" else None
+
+    wiring.add(
+        "language",
+        lambda: Language(
+            period=tick,
+            seed=seed,
+            can_climb=can_climb,
+            free_distance=free_distance,
+            detector=evidence(language_model),
+        ),
+    )
+    wiring.add(
+        "vision", lambda: Vision(period=tick, seed=seed, detector=evidence(vision_model))
+    )
+    for role, model in (("language", language_model), ("vision", vision_model)):
+        wiring.add(
+            f"{role}_link",
+            lambda model=model: ModelLink(  # type: ignore[misc]
+                broker=Broker(model.backend), latency=model.latency, period=tick
+            ),
+        )
+        wiring.connect(role, "model_request", f"{role}_link")
+        wiring.connect(f"{role}_link", "model_reply", role)
+    wiring.add(
+        "waypoint_memory",
+        lambda: WaypointMemory(
+            period=tick,
+            waypoints=memory.waypoints,
+            decisions=memory.decisions,
+            keyframes=memory.keyframes,
+            keyframe_travel=memory.keyframe_travel,
+            merge_distance=memory.merge_distance,
+        ),
+    )
+    wiring.add("goal_selector", GoalSelector)
+    wiring.connect("waypoint_memory", "history", "language")
+    if ablation in ("full", "no_tdm"):
+        wiring.connect("waypoint_memory", "second_chance", "language")
+    if ablation in ("full", "no_scb"):
+        wiring.add("todo_memory", lambda: TodoMemory(period=tick))
+        wiring.connect("language", "language_action", "todo_memory")
+        wiring.connect("todo_memory", "todo_list", "language")
+        wiring.connect("todo_memory", "todo_list", "vision")
+        wiring.give_output("todo_memory", "todo_list")
+    for level in ("vision", "waypoint_memory", "goal_selector"):
+        wiring.connect("language", "language_action", level)
+    wiring.connect("vision", "vision_action", "waypoint_memory")
+    wiring.connect("vision", "vision_action", "goal_selector")
+    wiring.connect("waypoint_memory", "history", "goal_selector")
+    _border(wiring)
+    return wiring.build("agent")
+
+
+def _border(wiring: Wiring) -> None:
+    wiring.take_input("task", "language", "vision")
+    wiring.take_input("panorama", "language", "vision", "waypoint_memory", "goal_selector")
+    wiring.take_input("front.color_image", "waypoint_memory")
+    wiring.take_input("pose_estimate", "waypoint_memory")
+    wiring.give_output("goal_selector", "goal")
+    wiring.give_output("language", "language_action")
+    wiring.give_output("vision", "vision_action")
+    wiring.give_output("waypoint_memory", "history")
+    for role in ("language", "vision"):
+        wiring.give_output(role, "model_request", f"{role}_request")
+        wiring.give_output(f"{role}_link", "model_reply", f"{role}_reply")
+        wiring.give_output(f"{role}_link", "usage", f"{role}_usage")

@@ -1,0 +1,170 @@
+"""The top Diagram: task, agent, navigation, station and observer in a ring, as in the paper."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import Diagram, System
+from pydrake.systems.primitives import ConstantValueSource
+
+from unilavira_drake.agent import ModelChoice, make_agent
+from unilavira_drake.episode_monitor import EpisodeMonitor
+from unilavira_drake.errors import ScenarioError, unknown_name
+from unilavira_drake.messages import Frame
+from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.navigation import make_navigation
+from unilavira_drake.recording.recorder import Recorder
+from unilavira_drake.scenario import Scenario
+from unilavira_drake.sensors.detections import GroundTruthDetector
+from unilavira_drake.sensors.free_distance import free_distance
+from unilavira_drake.sensors.observer import Observer
+from unilavira_drake.sensors.rig import front_intrinsics
+from unilavira_drake.station import make_navigation_station
+from unilavira_drake.task_choice import choose_task
+from unilavira_drake.wiring import Wiring
+from unilavira_drake.worlds.load import load_world
+from unilavira_drake.worlds.start import parse_start
+
+FRAMES_KEPT = 16
+"""Frames whose detections are remembered; a panorama re-issued under a new number costs none."""
+
+
+def make_navigation_diagram(
+    scenario: Scenario,
+    *,
+    replace: Mapping[str, System] | None = None,
+    detector: Callable[[Frame], ViewEvidence] | None = None,
+    goal_distance: Callable[[float, float], float] | None = None,
+    on_message: Callable[[float, str, str, object], None] | None = None,
+) -> Diagram:
+    """Returns the whole system of a scenario, ready for a Simulator.
+
+    Args:
+        scenario: what to build; it is read, never changed.
+        replace: user's own Systems by level name (``controller``, ``planner``, ``language``,
+            ...); each must have the ports of the level whose place it takes.
+        detector: what a model declared ``ground_truth`` is told about a frame; by default the
+            simulator's labels.
+        goal_distance: geodesic metres from a floor point (x, y) to the goal, for the monitor;
+            None when the episode is not scored.
+        on_message: called with (time, system, event, message) for each new message.
+
+    Raises:
+        InputError: if the scenario names something that does not exist.
+        PortTypeError: if a replaced level lacks a port.
+    """
+    own = dict(replace or {})
+    world = load_world(scenario.world.name, mirror=scenario.world.mirror)
+    task = choose_task(scenario)
+    start = parse_start(
+        task.start, world, radius=scenario.robot.radius, mirror=scenario.world.mirror
+    )
+    intrinsics = front_intrinsics(scenario.robot)
+    wiring = Wiring(own)
+    wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))
+    wiring.add("station", lambda: make_navigation_station(scenario, world=world, start=start))
+    wiring.add("observer", lambda: Observer(intrinsics=intrinsics, period=scenario.tick))
+    wiring.add(
+        "agent",
+        lambda: make_agent(
+            language_model=ModelChoice(
+                make_backend(scenario.language_model, place="language_model"),
+                scenario.language_latency,
+            ),
+            vision_model=ModelChoice(
+                make_backend(scenario.vision_model, place="vision_model"),
+                scenario.vision_latency,
+            ),
+            memory=scenario.memory,
+            ablation=scenario.ablation,
+            tick=scenario.tick,
+            seed=scenario.random_seed,
+            can_climb=scenario.robot.can_climb,
+            free_distance=functools.partial(
+                free_distance,
+                min_height=scenario.mapping.min_height,
+                max_height=scenario.mapping.max_height,
+            ),
+            detector=functools.lru_cache(FRAMES_KEPT)(
+                detector or GroundTruthDetector(world.labels)
+            ),
+            replace=own,
+        ),
+    )
+    wiring.add(
+        "navigation",
+        lambda: make_navigation(
+            robot=scenario.robot,
+            intrinsics=intrinsics,
+            mapping=scenario.mapping,
+            planning=scenario.planning,
+            tick=scenario.tick,
+            replace=own,
+        ),
+    )
+    wiring.add(
+        "episode_monitor",
+        lambda: EpisodeMonitor(
+            period=scenario.tick, budgets=scenario.budgets, goal_distance=goal_distance
+        ),
+    )
+    _close_the_ring(wiring)
+    if on_message is not None:
+        wiring.add("recorder", lambda: Recorder(on_message, period=scenario.tick))
+        _listen(wiring, todo=scenario.ablation in ("full", "no_scb"))
+    if own:
+        levels = (*_TOP_LEVELS, *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
+        raise ScenarioError(unknown_name("level", next(iter(own)), levels, "replace"))
+    return wiring.build("unilavira")
+
+
+_TOP_LEVELS = ("task", "station", "observer", "agent", "navigation", "episode_monitor", "recorder")
+_AGENT_LEVELS = (
+    "language",
+    "language_link",
+    "vision",
+    "vision_link",
+    "todo_memory",
+    "waypoint_memory",
+    "goal_selector",
+)
+_NAVIGATION_LEVELS = ("mapper", "planner", "controller", "governor")
+
+
+def _close_the_ring(wiring: Wiring) -> None:
+    for port in ("front.color_image", "front.depth_image", "front.label_image", "front.X_BC"):
+        wiring.connect("station", port, "observer")
+    wiring.connect("station", "pose_estimate", "observer")
+    wiring.connect("station", "twist", "observer")
+    wiring.connect("navigation", "navigation_status", "observer")
+    wiring.connect("task", "y0", "agent", "task")
+    wiring.connect("observer", "panorama", "agent")
+    wiring.connect("station", "front.color_image", "agent")
+    wiring.connect("station", "pose_estimate", "agent")
+    wiring.connect("agent", "goal", "navigation")
+    wiring.connect("observer", "panorama", "navigation")
+    wiring.connect("observer", "sweep", "navigation")
+    for port in ("front.depth_image", "front.X_BC", "pose_estimate", "twist"):
+        wiring.connect("station", port, "navigation")
+    wiring.connect("navigation", "base_command", "station")
+    wiring.connect("station", "cheat_X_WB", "episode_monitor")
+    wiring.connect("station", "contact_results", "episode_monitor")
+    wiring.connect("agent", "language_action", "episode_monitor")
+    wiring.connect("observer", "panorama", "episode_monitor")
+    wiring.connect("navigation", "navigation_status", "episode_monitor")
+
+
+def _listen(wiring: Wiring, *, todo: bool) -> None:
+    wiring.connect("observer", "panorama", "recorder")
+    wiring.connect("navigation", "navigation_status", "recorder")
+    wiring.connect("episode_monitor", "metrics", "recorder")
+    for port in ("language_action", "vision_action", "goal"):
+        wiring.connect("agent", port, "recorder")
+    for role in ("language", "vision"):
+        wiring.connect("agent", f"{role}_request", "recorder")
+        wiring.connect("agent", f"{role}_reply", "recorder")
+    if todo:
+        wiring.connect("agent", "todo_list", "recorder")

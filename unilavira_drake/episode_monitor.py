@@ -1,0 +1,189 @@
+"""The episode monitor: measures from the truth, and ends the episode with a named cause."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pydrake.common.value import AbstractValue
+from pydrake.multibody.plant import ContactResults
+from pydrake.systems.framework import Context, EventStatus
+
+from unilavira_drake.messages import LanguageAction, Message, NavigationStatus, Panorama
+from unilavira_drake.messages.metrics import EpisodeMetrics
+from unilavira_drake.ports import InputReader, Level, message_input, pose_input
+from unilavira_drake.scenario import Budgets
+
+SHORTEST_STEP = 0.001
+"""Path length counts steps of at least this length, metres."""
+SMALLEST_TURN = math.radians(1.0)
+"""A turn of this much is motion, radians."""
+CONTACT_FORCE = 1.0
+"""A weaker contact is none, newtons."""
+FLOOR_NORMAL = math.cos(math.radians(45.0))
+"""A contact whose normal is more upright than this carries the robot: no collision."""
+
+DECISION_CALLS = ("decide", "recover")
+"""The calls that choose a robot action."""
+
+
+@dataclass(frozen=True)
+class MonitorState(Message):
+    """The metrics, and what was last seen of each input."""
+
+    metrics: EpisodeMetrics = EpisodeMetrics()
+    started: bool = False
+    panorama: int = 0
+    action: int = 0
+    status: tuple[int, str] = (0, "arrived")
+    yaw: float = 0.0
+    in_contact: bool = False
+
+
+class EpisodeMonitor(Level):
+    """Measures path, distance to the goal and collisions, and ends the episode.
+
+    The causes are those of ``messages.metrics.CAUSES``.  The outcome is written in one tick and
+    the simulation ends in the next, so that recorders see it.
+
+    Contacts are sampled once per period: a touch shorter than that can be missed, and two touches
+    with a shorter gap count as one.  A robot that pushes against something is always seen.
+
+    .. pydrake_system::
+
+        name: EpisodeMonitor
+        input_ports:
+        - cheat_X_WB
+        - language_action
+        - panorama
+        - navigation_status
+        - contact_results
+        output_ports:
+        - metrics
+
+    Args:
+        period: polling and sampling period, seconds.
+        budgets: decisions, simulated time and stall time.
+        goal_distance: geodesic metres from a floor point (x, y) to the goal; None when the
+            episode is not scored.
+    """
+
+    def __init__(
+        self,
+        *,
+        period: float,
+        budgets: Budgets,
+        goal_distance: Callable[[float, float], float] | None = None,
+    ) -> None:
+        super().__init__(MonitorState(), period=period)
+        # Plain numbers: a caller's later change of the scenario must not reach a built System.
+        self._budgets = dataclasses.replace(budgets)
+        self._goal_distance = goal_distance
+        self._pose = pose_input(self, "cheat_X_WB")
+        self._action = message_input(self, "language_action", LanguageAction())
+        self._panorama = message_input(self, "panorama", Panorama())
+        self._status = message_input(self, "navigation_status", NavigationStatus())
+        self._contacts = InputReader(
+            self, "contact_results", ContactResults, AbstractValue.Make(ContactResults())
+        )
+        self.declare_output("metrics", lambda state: state.metrics, EpisodeMetrics())
+
+    def step(self, context: Context, state: MonitorState) -> MonitorState | EventStatus:
+        """Measures once; ends the simulation one tick after the cause was written."""
+        if state.metrics.ended:
+            return EventStatus.ReachedTermination(self, state.metrics.cause)
+        time = context.get_time()
+        action = self._action(context)
+        new = self._follow_ring(context, self._follow_motion(context, state, time), action, time)
+        new = self._follow_contacts(context, new)
+        cause = _cause(new.metrics, action, self._budgets, time)
+        if new is state and not cause:
+            return state
+        return dataclasses.replace(
+            new, metrics=dataclasses.replace(new.metrics, time=time, cause=cause)
+        )
+
+    def _follow_motion(self, context: Context, state: MonitorState, time: float) -> MonitorState:
+        X_WB = self._pose(context).GetAsMatrix34()
+        x, y = float(X_WB[0, 3]), float(X_WB[1, 3])
+        yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
+        metrics = state.metrics
+        step = metrics.distance_from(x, y) if state.started else 0.0
+        turned = abs(math.remainder(yaw - state.yaw, 2 * math.pi)) >= SMALLEST_TURN
+        if state.started and step < SHORTEST_STEP:
+            if not turned:
+                return state
+            metrics = dataclasses.replace(metrics, progress_time=time)
+            return dataclasses.replace(state, metrics=metrics, yaw=yaw)
+        distance = nearest = None
+        if self._goal_distance is not None:
+            distance = self._goal_distance(x, y)
+            nearest = min(
+                distance,
+                math.inf if metrics.min_goal_distance is None else metrics.min_goal_distance,
+            )
+        metrics = dataclasses.replace(
+            metrics,
+            x=x,
+            y=y,
+            path_length=metrics.path_length + step,
+            goal_distance=distance,
+            min_goal_distance=nearest,
+            progress_time=time,
+        )
+        return dataclasses.replace(state, metrics=metrics, yaw=yaw, started=True)
+
+    def _follow_ring(
+        self, context: Context, state: MonitorState, action: LanguageAction, time: float
+    ) -> MonitorState:
+        panorama = self._panorama(context).n
+        status = self._status(context)
+        seen = (status.n, status.state)
+        if (panorama, action.n, seen) == (state.panorama, state.action, state.status):
+            return state
+        decided = action.n > state.action and action.call in DECISION_CALLS
+        metrics = dataclasses.replace(
+            state.metrics, decisions=state.metrics.decisions + int(decided), progress_time=time
+        )
+        return dataclasses.replace(
+            state, metrics=metrics, panorama=panorama, action=action.n, status=seen
+        )
+
+    def _follow_contacts(self, context: Context, state: MonitorState) -> MonitorState:
+        force = _collision_force(self._contacts(context))
+        touching = force > CONTACT_FORCE
+        metrics = state.metrics
+        if touching == state.in_contact and force <= metrics.max_contact_force:
+            return state
+        onset = touching and not state.in_contact
+        metrics = dataclasses.replace(
+            metrics,
+            collisions=metrics.collisions + int(onset),
+            max_contact_force=max(metrics.max_contact_force, force),
+        )
+        return dataclasses.replace(state, metrics=metrics, in_contact=touching)
+
+
+def _cause(metrics: EpisodeMetrics, action: LanguageAction, budgets: Budgets, time: float) -> str:
+    if action.tool == "stop":
+        return "stopped"
+    if metrics.decisions > budgets.decisions:
+        return "decision_budget"
+    if time >= budgets.simulated_time:
+        return "time_budget"
+    if time - metrics.progress_time >= budgets.stall:
+        return "stalled"
+    return ""
+
+
+def _collision_force(contacts: ContactResults) -> float:
+    """The largest force of a contact that is not the floor's, newtons."""
+    largest = 0.0
+    for index in range(contacts.num_point_pair_contacts()):
+        info = contacts.point_pair_contact_info(index)
+        if abs(info.point_pair().nhat_BA_W[2]) < FLOOR_NORMAL:
+            fx, fy, fz = info.contact_force()
+            largest = max(largest, math.sqrt(fx * fx + fy * fy + fz * fz))
+    return largest

@@ -1,0 +1,1 @@
+"""Evaluation: goals and scores; nothing of the agent imports this."""

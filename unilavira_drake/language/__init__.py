@@ -1,0 +1,1 @@
+"""Language action: the large model chooses what to do (paper III-B.1)."""

@@ -1,0 +1,30 @@
+"""Which call the language model gets next: one pure table."""
+
+from __future__ import annotations
+
+from unilavira_drake.messages import LanguageAction, Outcome
+
+
+def next_call(last: LanguageAction, outcome: Outcome, *, family: str, has_todo: bool) -> str:
+    """Returns the call that follows the last language action and its outcome.
+
+    =============================  ==============================================
+    last action and outcome        next call
+    =============================  ==============================================
+    nothing yet                    ``plan_todo``; ``decide`` without a TODO memory
+    ``backtrack``, arrived         ``recover`` (paper III-D)
+    ``backtrack``, failed          ``decide``
+    ``double_check``               ``double_check``
+    confirmed, family ``eqa``      ``answer``
+    anything else                  ``decide``
+    =============================  ==============================================
+    """
+    if last.n == 0:
+        return "plan_todo" if has_todo else "decide"
+    if last.tool == "backtrack" and outcome.state == "arrived":
+        return "recover"
+    if last.tool == "double_check":
+        return "double_check"
+    if last.call == "double_check" and last.confirmed and family == "eqa":
+        return "answer"
+    return "decide"

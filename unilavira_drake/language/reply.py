@@ -1,0 +1,293 @@
+"""What the language model may reply, and its translation into a language action.
+
+The five calls (paper III-B1, III-C, III-D) have one reply model each.  Reasoning stands before
+what it decides, since a model writes in this order (paper III-C: separate ``reasoning_todo`` and
+``reasoning_action`` fields).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import pydantic
+
+from unilavira_drake.errors import ReplyFormatError
+from unilavira_drake.messages import DIRECTIONS, LanguageAction, TodoUpdate
+from unilavira_drake.mllm.reply_model import ReplyModel, bounded, clipped
+from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
+
+MAX_PLAN_ITEMS = 32
+REASONING_LIMIT = 1500
+SCENE_LIMIT = 160
+CONTENT_LIMIT = 200
+RESULT_LIMIT = 300
+REASON_LIMIT = 400
+ANSWER_LIMIT = 200
+
+
+class UpdateOp(ReplyModel):
+    """Closes an item with its evidence, or opens it again."""
+
+    op: Literal["update"]
+    index: int
+    status: Literal["completed", "pending"]
+    # May be missing: the TODO memory then rolls the completion back and says so.
+    result: str = ""
+
+
+class RewriteOp(ReplyModel):
+    """Words a pending item better."""
+
+    op: Literal["rewrite"]
+    index: int
+    content: str
+
+
+class AddOp(ReplyModel):
+    """Adds an item at a position, or at the end."""
+
+    op: Literal["add"]
+    content: str
+    index: int | None = None
+
+
+class RemoveOp(ReplyModel):
+    """Drops an item."""
+
+    op: Literal["remove"]
+    index: int
+
+
+class Turn(ReplyModel):
+    """Go towards something in one of the four views."""
+
+    tool: Literal["turn"]
+    direction: Literal["front", "left", "right", "back"]
+
+
+class Backtrack(ReplyModel):
+    """Drive back to a waypoint (paper III-D)."""
+
+    tool: Literal["backtrack"]
+    waypoint: int
+
+
+class GoStair(ReplyModel):
+    """Take the stairs."""
+
+    tool: Literal["go_stair"]
+    stair: Literal["up", "down"]
+
+
+class DoubleCheck(ReplyModel):
+    """Propose to stop here."""
+
+    tool: Literal["double_check"]
+
+
+TodoOp = Annotated[
+    UpdateOp | RewriteOp | AddOp | RemoveOp,
+    pydantic.Field(discriminator="op"),
+]
+Tool = Annotated[
+    Turn | Backtrack | GoStair | DoubleCheck,
+    pydantic.Field(discriminator="tool"),
+]
+
+
+class PlanReply(ReplyModel):
+    """Reply to ``plan_todo``."""
+
+    reasoning: str
+    todo: list[str]
+
+
+class ActionReply(ReplyModel):
+    """Reply to ``decide`` and ``recover``; the TODO fields may be left out without a list."""
+
+    progress_analysis: str
+    reasoning_todo: str = ""
+    todo_updates: list[TodoOp] = pydantic.Field(default_factory=list)
+    reasoning_action: str
+    action: Tool
+    scene: str
+
+
+class VerdictReply(ReplyModel):
+    """Reply to ``double_check``."""
+
+    reasoning: str
+    confirmed: bool
+    reason: str
+
+
+class AnswerReply(ReplyModel):
+    """Reply to ``answer``."""
+
+    reasoning: str
+    answer: str
+
+
+_MODELS: dict[str, type[ReplyModel]] = {
+    "plan_todo": PlanReply,
+    "decide": ActionReply,
+    "recover": ActionReply,
+    "double_check": VerdictReply,
+    "answer": AnswerReply,
+}
+
+
+def reply_schema(call: str) -> dict[str, Any]:
+    """Returns the JSON schema of the reply to a call, for backends with structured output."""
+    return _MODELS[call].model_json_schema()
+
+
+def parse_language_reply(text: str, request: MllmRequest) -> LanguageAction:
+    """Returns the language action that a reply to this request means.
+
+    ``plan_todo`` becomes ``stay`` with one ``add`` for each item; a confirmed ``double_check``
+    becomes ``stop``, or ``stay`` for EQA, where the ``answer`` call follows; a rejected one
+    becomes ``stay`` with the reason; an answer becomes ``stop``.
+
+    Raises:
+        ReplyFormatError: if the text has another form, or names a direction, waypoint, stair or
+            TODO index that the request does not offer.  The sentence can go into a re-ask.
+    """
+    variables = request.variables
+    if not isinstance(variables, LanguageVariables):
+        raise TypeError(f"request {request.n} of role {request.role!r} has no language variables")
+    reply = _MODELS[request.call].read(text)
+    if isinstance(reply, PlanReply):
+        return _plan(reply, request)
+    if isinstance(reply, VerdictReply):
+        return _verdict(reply, request, variables)
+    if isinstance(reply, AnswerReply):
+        return _answer(reply, request)
+    assert isinstance(reply, ActionReply)
+    return _decision(reply, request, variables)
+
+
+def _plan(reply: PlanReply, request: MllmRequest) -> LanguageAction:
+    if not 1 <= len(reply.todo) <= MAX_PLAN_ITEMS:
+        raise ReplyFormatError(
+            f"todo has {len(reply.todo)} items; give between 1 and {MAX_PLAN_ITEMS}."
+        )
+    adds = []
+    for number, content in enumerate(reply.todo, start=1):
+        line = bounded(content, CONTENT_LIMIT, f"item {number} of todo")
+        if not line:
+            raise ReplyFormatError(f"item {number} of todo is empty; leave it out or say it.")
+        adds.append(TodoUpdate(op="add", content=line))
+    return LanguageAction(
+        n=request.n,
+        call=request.call,
+        tool="stay",
+        todo_updates=tuple(adds),
+        reasoning_todo=clipped(reply.reasoning, REASONING_LIMIT),
+    )
+
+
+def _verdict(
+    reply: VerdictReply, request: MllmRequest, variables: LanguageVariables
+) -> LanguageAction:
+    reason = bounded(reply.reason, REASON_LIMIT, "reason")
+    if not reply.confirmed and not reason:
+        raise ReplyFormatError("confirmed is false and reason is empty; say what is missing.")
+    stops = reply.confirmed and variables.family != "eqa"
+    return LanguageAction(
+        n=request.n,
+        call=request.call,
+        tool="stop" if stops else "stay",
+        progress_analysis=clipped(reply.reasoning, REASONING_LIMIT),
+        confirmed=reply.confirmed,
+        reason=reason,
+    )
+
+
+def _answer(reply: AnswerReply, request: MllmRequest) -> LanguageAction:
+    answer = bounded(reply.answer, ANSWER_LIMIT, "answer")
+    if not answer:
+        raise ReplyFormatError("answer is empty; give the likeliest answer.")
+    return LanguageAction(
+        n=request.n,
+        call=request.call,
+        tool="stop",
+        progress_analysis=clipped(reply.reasoning, REASONING_LIMIT),
+        answer=answer,
+    )
+
+
+def _decision(
+    reply: ActionReply, request: MllmRequest, variables: LanguageVariables
+) -> LanguageAction:
+    updates = tuple(
+        _todo_update(op, number, variables) for number, op in enumerate(reply.todo_updates, start=1)
+    )
+    action = reply.action
+    if isinstance(action, Turn):
+        _check_turn(action, request.call, variables)
+    elif isinstance(action, Backtrack):
+        _check_backtrack(action, variables)
+    elif isinstance(action, GoStair) and not variables.can_climb:
+        raise ReplyFormatError(
+            "this robot cannot climb; go_stair is not offered, use another tool."
+        )
+    return LanguageAction(
+        n=request.n,
+        call=request.call,
+        tool=action.tool,
+        direction=action.direction if isinstance(action, Turn) else "",
+        waypoint=action.waypoint if isinstance(action, Backtrack) else None,
+        stair=action.stair if isinstance(action, GoStair) else "",
+        todo_updates=updates,
+        progress_analysis=clipped(reply.progress_analysis, REASONING_LIMIT),
+        reasoning_todo=clipped(reply.reasoning_todo, REASONING_LIMIT),
+        reasoning_action=clipped(reply.reasoning_action, REASONING_LIMIT),
+        scene=clipped(reply.scene, SCENE_LIMIT),
+    )
+
+
+def _check_turn(action: Turn, call: str, variables: LanguageVariables) -> None:
+    failed = variables.failed_direction
+    if call == "recover" and action.direction == failed:
+        remaining = ", ".join(word for word in DIRECTIONS if word != failed)
+        raise ReplyFormatError(
+            f"{failed} is the direction that has just failed from here; choose among {remaining}."
+        )
+
+
+def _check_backtrack(action: Backtrack, variables: LanguageVariables) -> None:
+    if not variables.second_chance:
+        raise ReplyFormatError("backtrack is not offered in this episode; use another tool.")
+    offered = [note.id for note in variables.waypoints if note.offered]
+    if not offered:
+        raise ReplyFormatError("no waypoint may be chosen for backtrack now; use another tool.")
+    if action.waypoint not in offered:
+        raise ReplyFormatError(
+            f"waypoint {action.waypoint} may not be chosen for backtrack; choose among "
+            f"{', '.join(map(str, offered))}."
+        )
+
+
+def _todo_update(
+    op: UpdateOp | RewriteOp | AddOp | RemoveOp, number: int, variables: LanguageVariables
+) -> TodoUpdate:
+    place = f"operation {number} of todo_updates"
+    if variables.todo is None:
+        raise ReplyFormatError("there is no TODO list in this episode; leave todo_updates out.")
+    last = len(variables.todo) + (1 if isinstance(op, AddOp) else 0)
+    if op.index is not None and not 1 <= op.index <= last:
+        raise ReplyFormatError(
+            f"{place} ({op.op}) has index {op.index}; the list as shown allows 1 to {last}."
+            if last
+            else f"{place} ({op.op}) has index {op.index}; the list is empty, only add can be used."
+        )
+    content = op.content if isinstance(op, RewriteOp | AddOp) else ""
+    result = op.result if isinstance(op, UpdateOp) else ""
+    return TodoUpdate(
+        op=op.op,
+        index=op.index,
+        content=bounded(content, CONTENT_LIMIT, f"the content of {place}"),
+        status=op.status if isinstance(op, UpdateOp) else "",
+        result=bounded(result, RESULT_LIMIT, f"the result of {place}"),
+    )

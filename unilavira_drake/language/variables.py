@@ -1,0 +1,159 @@
+"""From what the ports carry to the typed variables of a language prompt."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from unilavira_drake.messages import (
+    DIRECTIONS,
+    DecisionRecord,
+    Edge,
+    Frame,
+    History,
+    LanguageAction,
+    Panorama,
+    SecondChance,
+    TodoList,
+    Waypoint,
+    direction_of,
+)
+from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.mllm.request import (
+    DecisionNote,
+    ImagePart,
+    LanguageVariables,
+    MllmRequest,
+    ViewNote,
+    WaypointNote,
+)
+from unilavira_drake.tasks import TaskSpec
+
+
+def language_request(
+    *,
+    call: str,
+    seed: int,
+    task: TaskSpec,
+    panorama: Panorama,
+    history: History,
+    second_chance: SecondChance | None,
+    todo: TodoList | None,
+    last_action: LanguageAction,
+    can_climb: bool,
+    free_distance: Callable[[Frame], float],
+    detector: Callable[[Frame], ViewEvidence] | None,
+) -> MllmRequest:
+    """Returns the first attempt of call ``panorama.n``.
+
+    ``second_chance`` and ``todo`` are None when SCB and TDM are not wired.  The detector's
+    evidence is added only when one is given, that is for a model declared ``ground_truth``.
+    """
+    rejected = last_action.call == "double_check" and last_action.confirmed is False
+    variables = LanguageVariables(
+        family=task.family,
+        task=task.text,
+        views=tuple(
+            ViewNote(direction, round(free_distance(panorama.frame(direction)), 2))
+            for direction in DIRECTIONS
+        ),
+        last_action=_last_action(last_action, history),
+        outcome=_outcome(panorama) if last_action.n else "",
+        rejection=last_action.reason if rejected else "",
+        todo=None if todo is None else todo.items,
+        todo_feedback=() if todo is None else todo.feedback,
+        current_waypoint=history.current,
+        waypoints=tuple(
+            _waypoint_note(waypoint, panorama, history, second_chance)
+            for waypoint in history.waypoints
+        ),
+        decisions=tuple(DecisionNote(d.n, decision_text(d)) for d in history.decisions),
+        second_chance=second_chance is not None,
+        failed_edges=() if second_chance is None else _failed_edges(second_chance),
+        failed_direction="" if second_chance is None else second_chance.failed_direction,
+        can_climb=can_climb,
+    )
+    return MllmRequest(
+        role="language",
+        n=panorama.n,
+        seed=seed,
+        call=call,
+        variables=variables,
+        images=_images(panorama, history, second_chance),
+        evidence=None
+        if detector is None
+        else tuple(detector(panorama.frame(direction)) for direction in DIRECTIONS),
+    )
+
+
+def decision_text(record: DecisionRecord) -> str:
+    """Returns a past decision in words, e.g. ``turn left to 'white door': arrived``."""
+    action = " ".join(part for part in (record.tool, record.argument) if part)
+    target = f" to '{record.target_desc}'" if record.target_desc else ""
+    return f"at waypoint {record.waypoint}: {action}{target}: {record.outcome}"
+
+
+def _outcome(panorama: Panorama) -> str:
+    outcome = panorama.outcome
+    return f"{outcome.state}: {outcome.reason}" if outcome.reason else outcome.state
+
+
+def _last_action(action: LanguageAction, history: History) -> str:
+    if not action.n:
+        return ""
+    if history.decisions and history.decisions[-1].n == action.n:
+        return decision_text(history.decisions[-1])
+    return " ".join(part for part in (action.tool, action.argument) if part)
+
+
+def _degrees(angle: float) -> float:
+    return round(math.degrees(math.remainder(angle, 2 * math.pi)), 1)
+
+
+def _waypoint_note(
+    waypoint: Waypoint,
+    panorama: Panorama,
+    history: History,
+    second_chance: SecondChance | None,
+) -> WaypointNote:
+    x, y, _ = panorama.position
+    dx, dy = waypoint.position[0] - x, waypoint.position[1] - y
+    front = panorama.yaw if waypoint.id == history.current else waypoint.heading
+    return WaypointNote(
+        id=waypoint.id,
+        distance=round(math.hypot(dx, dy), 2),
+        bearing=_degrees(math.atan2(dy, dx) - panorama.yaw) if dx or dy else 0.0,
+        heading=_degrees(waypoint.heading - panorama.yaw),
+        caption=waypoint.caption,
+        tried=tuple(
+            _edge_text(edge, front) for edge in history.edges if edge.waypoint == waypoint.id
+        ),
+        offered=second_chance is not None and waypoint.id in second_chance.offers,
+    )
+
+
+def _edge_text(edge: Edge, front: float) -> str:
+    target = f" at waypoint {edge.to}" if edge.to is not None else ""
+    return f"{direction_of(edge.bearing - front)}: {edge.outcome}{target}"
+
+
+def _failed_edges(second_chance: SecondChance) -> tuple[str, ...]:
+    return tuple(
+        f"waypoint {edge.waypoint}, {edge.direction}: {edge.outcome}"
+        for edge in second_chance.failed_edges
+    )
+
+
+def _images(
+    panorama: Panorama, history: History, second_chance: SecondChance | None
+) -> tuple[ImagePart, ...]:
+    views = tuple(ImagePart(f"view {d}", panorama.frame(d).jpeg) for d in DIRECTIONS)
+    leg = tuple(
+        ImagePart(f"on the way here, {i + 1} of {len(history.keyframes)}", jpeg)
+        for i, jpeg in enumerate(history.keyframes)
+    )
+    frames = () if second_chance is None else second_chance.failed_frames
+    failed = tuple(
+        ImagePart(f"failed leg, {i + 1} of {len(frames)}", jpeg) for i, jpeg in enumerate(frames)
+    )
+    return leg + failed + views

@@ -1,0 +1,1 @@
+"""Mapping: from depth and pixels to a map and a goal."""

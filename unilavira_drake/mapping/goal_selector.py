@@ -1,0 +1,136 @@
+"""The goal selector: one goal for each language action."""
+
+from __future__ import annotations
+
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import Context, LeafSystem
+
+from unilavira_drake.mapping.projection import Projection, project_box, project_point
+from unilavira_drake.messages import (
+    Frame,
+    Goal,
+    History,
+    LanguageAction,
+    Panorama,
+    VisionAction,
+)
+from unilavira_drake.ports import message_input
+
+NO_STAIRS = "stairs: not possible for this robot or here"
+
+
+def select_goal(
+    action: LanguageAction,
+    vision: VisionAction,
+    history: History,
+    panorama: Panorama,
+    *,
+    max_range: float,
+) -> Goal:
+    """Returns the goal of a language action, or ``Goal(0)`` while its inputs are incomplete.
+
+    ``turn`` goes to what the vision action selected; ``backtrack`` to the waypoint, to face its
+    stored heading; ``stay`` and ``double_check`` stay; ``none``, ``go_stair`` and a vision action
+    without a selection give no goal, with the reason; ``stop`` gives no goal at all: the ring
+    rests.
+    """
+    n = action.n
+    if n == 0 or n != panorama.n or action.tool == "stop":
+        return Goal(0)
+    if action.tool in ("stay", "double_check"):
+        return Goal(n, "stay")
+    if action.tool == "go_stair":
+        return Goal(n, "none", reason=NO_STAIRS)
+    if action.tool == "backtrack":
+        if history.n != n:
+            return Goal(0)
+        waypoint = history.waypoint(action.waypoint) if action.waypoint is not None else None
+        if waypoint is None:
+            return Goal(n, "none", reason=f"unknown waypoint {action.waypoint}")
+        return Goal(n, "go", p_WG=waypoint.position, heading=waypoint.heading)
+    if action.tool != "turn":
+        return Goal(n, "none", reason=action.reason or "no usable action")
+    if vision.n != n:
+        return Goal(0)
+    return _selected(n, action, vision, panorama, max_range)
+
+
+def _selected(
+    n: int, action: LanguageAction, vision: VisionAction, panorama: Panorama, max_range: float
+) -> Goal:
+    direction = vision.direction or action.direction
+    try:
+        frame = panorama.frame(direction)
+    except KeyError:
+        return Goal(n, "none", reason=f"no target: there is no view {direction!r}")
+    projection = _projected(vision, frame, max_range)
+    if projection.p_WG is None:
+        return Goal(n, "none", reason=f"no target: {projection.reason}")
+    return Goal(n, "go", p_WG=projection.p_WG)
+
+
+def _projected(vision: VisionAction, frame: Frame, max_range: float) -> Projection:
+    if vision.box is not None:
+        return project_box(
+            vision.box,
+            depth=frame.depth,
+            intrinsics=frame.intrinsics,
+            X_WC=frame.X_WC,
+            max_range=max_range,
+        )
+    if vision.point is not None:
+        return project_point(
+            vision.point,
+            depth=frame.depth,
+            intrinsics=frame.intrinsics,
+            X_WC=frame.X_WC,
+            max_range=max_range,
+        )
+    return Projection(reason=vision.reason or "nothing was selected")
+
+
+class GoalSelector(LeafSystem):
+    """Turns the language action and its vision action into one goal in the world.
+
+    Stateless: the goal is a function of four messages with the same number.
+
+    .. pydrake_system::
+
+        name: GoalSelector
+        input_ports:
+        - vision_action
+        - language_action
+        - history
+        - panorama
+        output_ports:
+        - goal
+
+    Args:
+        max_range: targets beyond this depth are refused, metres.
+    """
+
+    def __init__(self, *, max_range: float = 10.0) -> None:
+        super().__init__()
+        self._max_range = max_range
+        self._vision = message_input(self, "vision_action", VisionAction())
+        self._action = message_input(self, "language_action", LanguageAction())
+        self._history = message_input(self, "history", History())
+        self._panorama = message_input(self, "panorama", Panorama())
+        readers = (self._vision, self._action, self._history, self._panorama)
+        # Without these Drake would also count time, and select anew at every tick.
+        self.DeclareAbstractOutputPort(
+            "goal",
+            lambda: AbstractValue.Make(Goal()),
+            self._calc_goal,
+            prerequisites_of_calc={reader.ticket for reader in readers},
+        )
+
+    def _calc_goal(self, context: Context, output: AbstractValue) -> None:
+        goal = select_goal(
+            self._action(context),
+            self._vision(context),
+            self._history(context),
+            self._panorama(context),
+            max_range=self._max_range,
+        )
+        output.set_value(goal)

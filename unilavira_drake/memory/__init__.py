@@ -1,0 +1,1 @@
+"""Memory: the TODO list (TDM) and the waypoints (SCB)."""

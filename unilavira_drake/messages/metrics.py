@@ -1,0 +1,58 @@
+"""What is measured of an episode, and why it ended."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from unilavira_drake.messages.frozen import Message
+
+CAUSES = {
+    "stopped": "The agent ended the episode by its own verified stop.",
+    "decision_budget": "The agent asked for one more decision than the budget allows.",
+    "time_budget": "The simulated time of the budget is over.",
+    "stalled": "For the stall time no panorama, action, status or motion was new.",
+    "interrupted": "A person stopped the run; what was done until then is kept.",
+}
+"""Every cause with which an episode ends, and what it means."""
+
+
+@dataclass(frozen=True)
+class EpisodeMetrics(Message):
+    """Measured from the true pose, the contacts and the messages up to ``time``."""
+
+    time: float = 0.0
+    """Simulated seconds of the latest change."""
+    x: float = 0.0
+    """Position of the base in the world, metres."""
+    y: float = 0.0
+    path_length: float = 0.0
+    """Metres, from steps of at least 1 mm."""
+    goal_distance: float | None = None
+    """Geodesic metres to the goal now; None when the episode is not scored."""
+    min_goal_distance: float | None = None
+    """The least of it so far."""
+    collisions: int = 0
+    """How often a contact began."""
+    max_contact_force: float = 0.0
+    """Newtons, over the sampled contacts."""
+    decisions: int = 0
+    """``decide`` and ``recover`` calls answered so far."""
+    progress_time: float = 0.0
+    """When a panorama, action, status or motion was last new, simulated seconds."""
+    cause: str = ""
+    """A key of ``CAUSES`` once the episode has ended, else empty."""
+
+    @property
+    def ended(self) -> bool:
+        """Whether the episode has ended."""
+        return bool(self.cause)
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """Position of the base in the world, metres."""
+        return self.x, self.y
+
+    def distance_from(self, x: float, y: float) -> float:
+        """Returns the straight distance between the base and a floor point, metres."""
+        return math.hypot(self.x - x, self.y - y)

@@ -1,0 +1,1 @@
+"""Planning: from a map and a goal to a path."""

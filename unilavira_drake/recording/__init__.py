@@ -1,0 +1,1 @@
+"""Recording: transcript, results and pictures of a run."""

@@ -1,0 +1,1 @@
+"""Robots: one module and one SDF each, and the controllers they share."""

@@ -1,0 +1,77 @@
+"""The ground controller: follows the path, or turns to the heading of the sweep."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+
+from unilavira_drake.messages import Path, Sweep
+from unilavira_drake.ports import message_input, pose_input, vector_input
+from unilavira_drake.robots.drive_limits import DriveLimits, Reaction, approach
+from unilavira_drake.robots.ground_tracking import track_path, turn_rate, warm_up
+
+
+class GroundTrackingController(LeafSystem):
+    """Tracks with a differential base; its state is the previous command.
+
+    It follows ``path`` iff path.n >= sweep.n and the path is not empty, else it turns in place to
+    the heading of an active ``sweep``, else it slows down to rest.  Sweep n + 1 begins after goal
+    n is done, whose path is empty, so the two never ask for different things.
+
+    .. pydrake_system::
+
+        name: GroundTrackingController
+        input_ports:
+        - path
+        - sweep
+        - pose_estimate
+        - twist
+        output_ports:
+        - desired_command
+
+    ``desired_command`` is (4,) float64: vx, vy, wz of the base frame B relative to the world,
+    expressed in B (m/s, rad/s; vy is 0), and the time at which it was issued (s).
+
+    Args:
+        limits: limits of the base; the update period is among them.
+        reaction: how fast the base obeys.
+    """
+
+    def __init__(self, *, limits: DriveLimits, reaction: Reaction = Reaction()) -> None:
+        super().__init__()
+        warm_up()
+        self._limits = limits
+        self._reaction = reaction
+        self._path = message_input(self, "path", Path())
+        self._sweep = message_input(self, "sweep", Sweep())
+        self._pose = pose_input(self, "pose_estimate")
+        self._twist = vector_input(self, "twist", 6)
+        self._command_index = self.DeclareDiscreteState(4)
+        self.DeclareStateOutputPort("desired_command", self._command_index)
+        self.DeclarePeriodicDiscreteUpdateEvent(limits.period, 0.0, self._update)
+
+    def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
+        limits = self._limits
+        speed, _, rate, _ = context.get_discrete_state(self._command_index).value()
+        path = self._path(context)
+        sweep = self._sweep(context)
+        follow = len(path.p_WP) > 0 and path.n >= sweep.n
+        if follow or sweep.active:
+            X_WB = self._pose(context).GetAsMatrix34()
+            yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
+            yaw_rate = self._twist(context)[2]
+        if follow:
+            speed, rate = track_path(
+                path.p_WP, X_WB[0, 3], X_WB[1, 3], yaw, yaw_rate, speed, rate, self._reaction, limits
+            )
+        else:
+            speed = approach(speed, 0.0, limits.max_acceleration * limits.period)
+            if sweep.active:
+                rate = turn_rate(sweep.heading - yaw, yaw_rate, rate, self._reaction, limits)
+            else:
+                rate = approach(rate, 0.0, limits.max_yaw_acceleration * limits.period)
+        discrete_state.set_value(
+            self._command_index, np.array([speed, 0.0, rate, context.get_time()])
+        )

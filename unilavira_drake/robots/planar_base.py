@@ -1,0 +1,87 @@
+"""A base that moves in the plane: body twist in, desired joint velocities and pose out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from unilavira_drake.ports import vector_input
+
+
+class PlanarBase(LeafSystem):
+    """Translates between a body twist and the x, y, yaw joints of a planar base.
+
+    The plant servoes the joints' velocities with bounded effort, so the base stalls at a wall.
+    A differential base cannot move sideways: it ignores ``vy``, and its servo resists a push.
+
+    .. pydrake_system::
+        name: PlanarBase
+        input_ports:
+        - base_command
+        - joint_state
+        output_ports:
+        - desired_joint_state
+        - pose_estimate
+        - twist
+
+    ``base_command`` is [vx, vy, wz] in the body frame B, m/s and rad/s; ``joint_state`` and
+    ``desired_joint_state`` are [x, y, yaw, x', y', yaw'] in the world W; ``pose_estimate`` is
+    X_WB, ``twist`` is [w; v] of B in W, expressed in B.
+
+    Args:
+        holonomic: whether ``vy`` is obeyed.
+    """
+
+    def __init__(self, *, holonomic: bool = False) -> None:
+        super().__init__()
+        self.set_name("planar_base")
+        self._holonomic = holonomic
+        self._command = vector_input(self, "base_command", 3)
+        self._joint_state = vector_input(self, "joint_state", 6)
+        state_ticket = {self.input_port_ticket(self.GetInputPort("joint_state").get_index())}
+        self.DeclareVectorOutputPort("desired_joint_state", BasicVector(6), self._calc_desired)
+        self.DeclareAbstractOutputPort(
+            "pose_estimate",
+            lambda: AbstractValue.Make(RigidTransform()),
+            self._calc_pose,
+            prerequisites_of_calc=state_ticket,
+        )
+        self.DeclareVectorOutputPort(
+            "twist", BasicVector(6), self._calc_twist, prerequisites_of_calc=state_ticket
+        )
+
+    def _calc_desired(self, context: Context, output: BasicVector) -> None:
+        command = self._command(context)
+        yaw = float(self._joint_state(context)[2])
+        velocity = world_velocity(command, yaw, holonomic=self._holonomic)
+        output.SetFromVector(np.concatenate((np.zeros(3), velocity)))
+
+    def _calc_pose(self, context: Context, output: Value[RigidTransform]) -> None:
+        x, y, yaw = self._joint_state(context)[:3]
+        output.set_value(planar_pose(float(x), float(y), float(yaw)))
+
+    def _calc_twist(self, context: Context, output: BasicVector) -> None:
+        _, _, yaw, vx, vy, wz = self._joint_state(context)
+        c, s = math.cos(yaw), math.sin(yaw)
+        output.SetFromVector([0.0, 0.0, wz, c * vx + s * vy, c * vy - s * vx, 0.0])
+
+
+def world_velocity(
+    command: NDArray[np.float64], yaw: float, *, holonomic: bool
+) -> NDArray[np.float64]:
+    """Returns the (3,) joint velocities [x', y', yaw'] in the world of a body twist."""
+    vx, vy, wz = command
+    sideways = vy if holonomic else 0.0
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array([c * vx - s * sideways, s * vx + c * sideways, wz])
+
+
+def planar_pose(x: float, y: float, yaw: float) -> RigidTransform:
+    """Returns X_WB of a base on the floor."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return RigidTransform(np.array([[c, -s, 0.0, x], [s, c, 0.0, y], [0.0, 0.0, 1.0, 0.0]]))

@@ -1,0 +1,130 @@
+"""How far a rectangular base may go before its leading edge meets an occupied cell."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.kernels import kernel
+from unilavira_drake.messages import read_only
+
+
+class Footprint(NamedTuple):
+    """Rectangle of the base about its centre, metres."""
+
+    half_length: float = 0.345
+    half_width: float = 0.285
+    standoff: float = 0.05
+    """Distance that stays free before the leading edge; at least half a cell."""
+
+
+@kernel
+def _distance_to_cell(
+    px: float, py: float, curvature: float, footprint: Footprint, half_cell: float
+) -> float:
+    """Travel until the front edge meets a point given in the base frame; inf if it never does."""
+    length = footprint.half_length + footprint.standoff
+    width = footprint.half_width + half_cell
+    if abs(px) < footprint.half_length and abs(py) < width:
+        return math.inf
+    if footprint.half_length <= px <= length and abs(py) < width:
+        return 0.0
+    if abs(curvature) < 1e-4:
+        return px - length if px > length and abs(py) < width else math.inf
+    # Seen from the base, the point circles about the centre of rotation (0, radius).
+    radius = 1.0 / curvature
+    reach = px * px + (py - radius) ** 2 - length * length
+    if reach < 0.0:
+        return math.inf
+    best = math.inf
+    for side in (-1.0, 1.0):
+        qy = radius + side * math.sqrt(reach)
+        if abs(qy) < width:
+            turn = math.atan2(py - radius, px) - math.atan2(qy - radius, length)
+            turn = math.copysign(1.0, curvature) * turn
+            turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi))
+            best = min(best, turn * abs(radius))
+    return best
+
+
+@kernel
+def free_distance(
+    log_odds: NDArray[np.int8],
+    origin: tuple[float, float],
+    resolution: float,
+    x: float,
+    y: float,
+    yaw: float,
+    curvature: float,
+    backwards: bool,
+    horizon: float,
+    footprint: Footprint,
+) -> float:
+    """Returns the travel along an arc until the leading edge meets an occupied cell, metres.
+
+    Cells that the base itself covers are ignored: the base stands there.  Cells outside the map
+    and unknown ones count as free; the planner keeps away from what was never seen.
+
+    Args:
+        log_odds: (rows, columns) int8; positive is occupied.
+        origin: world (x, y) of the corner of cell (0, 0), metres.
+        resolution: side of a cell, metres.
+        x: position of the base, metres.
+        y: position of the base, metres.
+        yaw: heading of the base, radians.
+        curvature: yaw rate by speed of the motion, 1/m; positive turns left when going forwards.
+        backwards: whether the base goes backwards.
+        horizon: cells farther ahead than this are not looked at, metres.
+        footprint: of the base.
+
+    Returns:
+        ``horizon`` when nothing is met within it.
+    """
+    rows, columns = log_odds.shape
+    reach = math.hypot(footprint.half_length + footprint.standoff, footprint.half_width) + horizon
+    row_0 = max(int(math.floor((y - reach - origin[1]) / resolution)), 0)
+    row_1 = min(int(math.floor((y + reach - origin[1]) / resolution)) + 1, rows)
+    column_0 = max(int(math.floor((x - reach - origin[0]) / resolution)), 0)
+    column_1 = min(int(math.floor((x + reach - origin[0]) / resolution)) + 1, columns)
+    # Going backwards is going forwards with the base seen from behind: x and y change sign.
+    sign = -1.0 if backwards else 1.0
+    c, s = sign * math.cos(yaw), sign * math.sin(yaw)
+    best = horizon
+    for row in range(row_0, row_1):
+        for column in range(column_0, column_1):
+            if log_odds[row, column] > 0:
+                dx = origin[0] + (column + 0.5) * resolution - x
+                dy = origin[1] + (row + 0.5) * resolution - y
+                px, py = c * dx + s * dy, c * dy - s * dx
+                distance = _distance_to_cell(px, py, sign * curvature, footprint, resolution / 2.0)
+                best = min(best, distance)
+    return best
+
+
+@kernel
+def stoppable_speed(free: float, deceleration: float, period: float) -> float:
+    """Returns the largest v with v^2 / (2 deceleration) + period v <= free; 0 when free <= 0."""
+    if free <= 0.0:
+        return 0.0
+    step = deceleration * period
+    return math.sqrt(step * step + 2.0 * deceleration * free) - step
+
+
+def warm_up() -> None:
+    """Compiles the kernels of this module."""
+    free_distance(
+        read_only(np.zeros((1, 1), np.int8)),
+        (0.0, 0.0),
+        1.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        False,
+        1.0,
+        Footprint(),
+    )
+    stoppable_speed(1.0, 1.0, 1.0)

@@ -1,0 +1,1 @@
+"""Sensors: cameras, detections and the panorama."""

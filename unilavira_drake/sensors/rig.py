@@ -1,0 +1,91 @@
+"""RGB-D cameras on a robot: Drake's ``RgbdSensor``, rendered only when pulled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    LightParameter,
+    MakeRenderEngineVtk,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.sensors import CameraInfo, RgbdSensor
+
+from unilavira_drake.messages import Intrinsics
+
+RENDERER = "vtk"
+"""Name of the render engine in the scene graph."""
+
+
+def pinhole(width: int, height: int, horizontal_fov_degrees: float) -> Intrinsics:
+    """Returns square-pixel intrinsics with the principal point in the image's middle.
+
+    Pixel centres have integer coordinates, as in Drake's ``CameraInfo``.
+    """
+    focal = width / (2.0 * math.tan(math.radians(horizontal_fov_degrees) / 2.0))
+    return Intrinsics(width, height, focal, focal, width / 2 - 0.5, height / 2 - 0.5)
+
+
+def add_renderer(scene_graph: SceneGraph, lights: Sequence[LightParameter]) -> None:
+    """Adds Drake's VTK renderer on EGL: no display, no window."""
+    parameters = RenderEngineVtkParams(lights=list(lights), backend="EGL")
+    scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(parameters))
+
+
+def add_rgbd_camera(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    *,
+    frame_name: str,
+    intrinsics: Intrinsics,
+    min_depth: float,
+    max_depth: float,
+) -> tuple[RgbdSensor, RigidTransform]:
+    """Adds a camera at a named frame of the plant (x right, y down, z forward).
+
+    Colour, depth and label share one pinhole.  Depth is float32 metres along z: 0 nearer than
+    ``min_depth``, inf beyond ``max_depth``.
+
+    Returns:
+        The sensor, and X_BC, the camera's pose in the body that carries it.
+    """
+    frame = plant.GetFrameByName(frame_name)
+    X_BC = frame.GetFixedPoseInBodyFrame()
+    core = RenderCameraCore(
+        RENDERER,
+        CameraInfo(
+            intrinsics.width,
+            intrinsics.height,
+            intrinsics.fx,
+            intrinsics.fy,
+            intrinsics.cx,
+            intrinsics.cy,
+        ),
+        ClippingRange(min(0.05, min_depth), max(40.0, 2.0 * max_depth)),
+        RigidTransform(),
+    )
+    body_frame = plant.GetBodyFrameIdOrThrow(frame.body().index())
+    sensor = builder.AddNamedSystem(
+        frame_name,
+        RgbdSensor(
+            body_frame,
+            X_BC,
+            ColorRenderCamera(core, False),
+            DepthRenderCamera(core, DepthRange(min_depth, max_depth)),
+        ),
+    )
+    builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+    return sensor, X_BC
+
+

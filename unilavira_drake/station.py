@@ -1,0 +1,132 @@
+"""The station: robot, world and cameras as one Diagram with named ports."""
+
+from __future__ import annotations
+
+from pydrake.common.value import AbstractValue
+from pydrake.geometry import SceneGraph
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantValueSource
+
+from unilavira_drake.resources import package_xml
+from unilavira_drake.robots.planar_base import PlanarBase, planar_pose
+from unilavira_drake.scenario import Scenario
+from unilavira_drake.sensors.rig import add_renderer, add_rgbd_camera, pinhole
+from unilavira_drake.task_choice import choose_task
+from unilavira_drake.worlds.load import load_world
+from unilavira_drake.worlds.scenery import add_scenery, lights
+from unilavira_drake.worlds.start import parse_start
+from unilavira_drake.worlds.world import World
+
+
+def add_navigation_station(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    world: World | None = None,
+    *,
+    X_WB_start: RigidTransform | None = None,
+) -> Diagram:
+    """Adds the Diagram ``station``: plant, scene graph, front camera and actuation.
+
+    .. pydrake_system::
+        name: station
+        input_ports:
+        - base_command
+        output_ports:
+        - front.color_image
+        - front.depth_image
+        - front.label_image
+        - front.X_BC
+        - pose_estimate
+        - twist
+        - contact_results
+        - cheat_X_WB
+
+    Images are rendered only when pulled.  ``cheat_X_WB`` is the true pose: for scoring only.
+
+    Args:
+        world: read from the scenario when None.
+        X_WB_start: where the robot starts; the chosen task's start when None.
+
+    Raises:
+        ScenarioError: if the world's file cannot be used.
+        TaskError: if the start cannot be used.
+    """
+    if world is None:
+        world = load_world(scenario.world.name, mirror=scenario.world.mirror)
+    if X_WB_start is None:
+        start = choose_task(scenario).start
+        X_WB_start = planar_pose(*parse_start(start, world, radius=scenario.robot.radius))
+    station: Diagram = builder.AddSystem(_build_station(scenario, world, X_WB_start))
+    return station
+
+
+def _build_station(scenario: Scenario, world: World, X_WB: RigidTransform) -> Diagram:
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlant(scenario.plant, builder)
+    add_scenery(plant, scene_graph, world)
+    robot = _add_robot(plant, scenario.robot.name)
+    plant.Finalize()
+    yaw = X_WB.rotation().ToRollPitchYaw().yaw_angle()
+    plant.SetDefaultPositions(robot, [*X_WB.translation()[:2], yaw])
+    add_renderer(scene_graph, lights(mirrored=world.mirrored))
+    _add_base(builder, plant, robot)
+    _add_front_camera(builder, plant, scene_graph, scenario)
+    builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
+    if scenario.meshcat:
+        _add_meshcat(builder, scene_graph)
+    station = builder.Build()
+    station.set_name("station")
+    return station
+
+
+def _add_robot(plant: MultibodyPlant, name: str) -> ModelInstanceIndex:
+    parser = Parser(plant)
+    parser.package_map().AddPackageXml(str(package_xml()))
+    (robot,) = parser.AddModelsFromUrl(f"package://unilavira_drake/robots/{name}.sdf")
+    return robot
+
+
+def _add_base(builder: DiagramBuilder, plant: MultibodyPlant, robot: ModelInstanceIndex) -> None:
+    base = builder.AddSystem(PlanarBase())
+    builder.Connect(plant.get_state_output_port(robot), base.GetInputPort("joint_state"))
+    builder.Connect(
+        base.GetOutputPort("desired_joint_state"), plant.get_desired_state_input_port(robot)
+    )
+    builder.ExportInput(base.GetInputPort("base_command"), "base_command")
+    for port, name in (
+        ("pose_estimate", "pose_estimate"),
+        ("twist", "twist"),
+        ("pose_estimate", "cheat_X_WB"),
+    ):
+        builder.ExportOutput(base.GetOutputPort(port), name)
+
+
+def _add_front_camera(
+    builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph, scenario: Scenario
+) -> None:
+    robot = scenario.robot
+    sensor, X_BC = add_rgbd_camera(
+        builder,
+        plant,
+        scene_graph,
+        frame_name="front_camera",
+        intrinsics=pinhole(robot.image_width, robot.image_height, robot.horizontal_fov_degrees),
+        min_depth=robot.min_depth,
+        max_depth=robot.max_depth,
+    )
+    builder.ExportOutput(sensor.color_image_output_port(), "front.color_image")
+    builder.ExportOutput(sensor.depth_image_32F_output_port(), "front.depth_image")
+    builder.ExportOutput(sensor.label_image_output_port(), "front.label_image")
+    mount = builder.AddNamedSystem("front_mount", ConstantValueSource(AbstractValue.Make(X_BC)))
+    builder.ExportOutput(mount.get_output_port(), "front.X_BC")
+
+
+def _add_meshcat(builder: DiagramBuilder, scene_graph: SceneGraph) -> None:
+    # Half a second to import, so only when asked for.
+    from pydrake.geometry import MeshcatVisualizer, StartMeshcat
+
+    MeshcatVisualizer.AddToBuilder(builder, scene_graph, StartMeshcat())

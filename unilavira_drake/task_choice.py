@@ -1,0 +1,63 @@
+"""Which task an episode runs, from the scenario's named tasks and the person's choice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from unilavira_drake.errors import ScenarioError, TaskError, unknown_name
+from unilavira_drake.scenario import NamedTask, Scenario
+from unilavira_drake.tasks import TaskSpec, checked_task
+
+
+@dataclass(frozen=True)
+class EpisodeTask:
+    """A task with what scores it; only ``spec`` reaches the agent."""
+
+    spec: TaskSpec
+    name: str
+    """Name in the scenario; empty for free text."""
+    start: str
+    goal: str
+    """Empty when the episode is not scored."""
+
+
+def choose_task(scenario: Scenario) -> EpisodeTask:
+    """Returns the chosen task.
+
+    Text that equals a named task's (case and spaces folded) or ``@NAME`` is that task; other
+    text is scored only against an explicit goal.
+
+    Raises:
+        TaskError: for an unknown name, or an empty or too long text.
+        ScenarioError: if nothing is chosen and the scenario has no default task.
+    """
+    choice = scenario.task
+    text = choice.text
+    if not text:
+        if not scenario.default_task:
+            raise ScenarioError(
+                "scenario.default_task: empty, and no task was given; set it to one of: "
+                f"{', '.join(sorted(scenario.tasks)) or 'none'}, or pass --task."
+            )
+        text = f"@{scenario.default_task}"
+    name = _named(scenario, text)
+    task = scenario.tasks[name] if name else NamedTask(text=text)
+    return EpisodeTask(
+        spec=checked_task(task.text, task.family),
+        name=name,
+        start=choice.start or task.start or scenario.start,
+        goal=choice.goal or task.goal,
+    )
+
+
+def _named(scenario: Scenario, text: str) -> str:
+    if text.strip().startswith("@"):
+        name = text.strip()[1:]
+        if name not in scenario.tasks:
+            raise TaskError(unknown_name("task", name, scenario.tasks, "task"))
+        return name
+    folded = " ".join(text.casefold().split())
+    for name, task in scenario.tasks.items():
+        if " ".join(task.text.casefold().split()) == folded:
+            return name
+    return ""

@@ -1,0 +1,1 @@
+"""Vision action: the grounding model chooses where (paper III-B.2)."""

@@ -1,0 +1,101 @@
+"""Where the robot starts: ROOM or X,Y,YAW, checked against the world."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from unilavira_drake.errors import TaskError, unknown_name
+from unilavira_drake.worlds.clearance import clearance, nearest_obstacle, room_grid
+from unilavira_drake.worlds.world import Room, World
+
+GRID_STEP = 0.05
+"""Spacing of the points among which a free one is looked for, metres."""
+
+
+def parse_start(text: str, world: World, *, radius: float) -> tuple[float, float, float]:
+    """Returns x, y (metres) and yaw (radians) of a start.
+
+    ``ROOM`` (a name or kind) is the point of that room farthest from everything, yaw 0.
+    ``X,Y,YAW`` is written for the world as its file says; in a mirrored world y and yaw are
+    negated with it.
+
+    Args:
+        radius: the robot's, metres; a start keeps at least this clearance.
+
+    Raises:
+        TaskError: names the value and the remedy, for malformed text, an unknown room, and a
+            place outside the world, in a wall or in furniture.
+    """
+    text = text.strip()
+    if not text:
+        raise TaskError(f"start: empty; give a room ({_rooms(world)}) or X,Y,YAW.")
+    if "," not in text:
+        return (*_free_point(text, world, radius), 0.0)
+    x, y, yaw = _numbers(text, world)
+    if world.mirrored:
+        y, yaw = -y, -yaw
+    _check_free(text, x, y, world, radius)
+    return x, y, yaw
+
+
+def _rooms(world: World) -> str:
+    return ", ".join(sorted(room.name for room in world.rooms))
+
+
+def _numbers(text: str, world: World) -> tuple[float, float, float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3 or not all(math.isfinite(number) for number in numbers):
+        raise TaskError(
+            f"start: {text!r} is not X,Y,YAW: three numbers (metres, metres, radians), "
+            f"e.g. 2.0,8.0,-1.57; or give a room: {_rooms(world)}."
+        )
+    return numbers[0], numbers[1], numbers[2]
+
+
+def _free_point(name: str, world: World, radius: float) -> tuple[float, float]:
+    room = world.room(name) or world.room(name.replace("_", " "))
+    if room is None:
+        names = {room.name for room in world.rooms} | {room.kind for room in world.rooms}
+        raise TaskError(unknown_name("room", name, names, "start"))
+    x, y, free = _roomiest(room, world)
+    if free < radius:
+        raise TaskError(
+            f"start: {name!r} has no place for a robot of radius {radius:.2f} m; "
+            "choose another room or X,Y,YAW."
+        )
+    return x, y
+
+
+def _roomiest(room: Room, world: World) -> tuple[float, float, float]:
+    points = room_grid(room, GRID_STEP)
+    distances = clearance(world, points)
+    best = int(np.argmax(distances))
+    return float(points[best, 0]), float(points[best, 1]), float(distances[best])
+
+
+def _check_free(text: str, x: float, y: float, world: World, radius: float) -> None:
+    room = world.room_at(x, y)
+    if room is None:
+        raise TaskError(
+            f"start: {text!r} is outside the world {world.name!r}; "
+            f"give a room ({_rooms(world)}) or a point inside one."
+        )
+    name, distance = nearest_obstacle(world, x, y)
+    if distance >= radius:
+        return
+    where = f"inside {name}" if distance == 0.0 else f"only {distance:.2f} m from {name}"
+    points = room_grid(room, GRID_STEP)
+    free = points[clearance(world, points) >= radius]
+    remedy = f"give a room: {_rooms(world)}"
+    if len(free):
+        near_x, near_y = free[np.argmin(np.hypot(free[:, 0] - x, free[:, 1] - y))]
+        sign = -1.0 if world.mirrored else 1.0
+        remedy = f"the nearest free place is {near_x:.2f},{sign * near_y:.2f}, or {remedy}"
+    raise TaskError(
+        f"start: {text!r} is {where} and the robot needs {radius:.2f} m; {remedy}."
+    )
