@@ -59,9 +59,7 @@ def make_navigation_diagram(
     own = dict(replace or {})
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
     task = choose_task(scenario)
-    start = parse_start(
-        task.start, world, radius=scenario.robot.radius, mirror=scenario.world.mirror
-    )
+    start = parse_start(task.start, world, radius=scenario.robot.radius)
     intrinsics = front_intrinsics(scenario.robot)
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))

@@ -23,11 +23,19 @@ def kernel(function: F) -> F:
     Where neither the package's folder nor the user's cache folder can be written, it is compiled
     anew in each process.
     """
-    options = {"nogil": True, "error_model": "numpy"}
+    return _compiled(function, forceinline=False)
+
+
+def inlined_kernel(function: F) -> F:
+    """As :func:`kernel`, for a step of an inner loop: made part of every kernel that calls it."""
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function: F, **options: bool) -> F:
     try:
-        return cast(F, numba.njit(cache=True, **options)(function))
+        return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function))
     except RuntimeError:
-        return cast(F, numba.njit(**options)(function))
+        return cast(F, numba.njit(nogil=True, error_model="numpy", **options)(function))
 
 
 def frozen_view(array: NDArray[Any], dtype: type[np.generic]) -> NDArray[Any]:

@@ -11,8 +11,10 @@ from unilavira_drake.mapping.system import OccupancyMapper
 from unilavira_drake.messages import Intrinsics
 from unilavira_drake.planning.system import FastMarchingPlanner
 from unilavira_drake.robots.cobot_magic import CobotMagic
+from unilavira_drake.robots.drive_limits import DriveLimits
 from unilavira_drake.robots.governor import Governor
 from unilavira_drake.robots.ground_controller import GroundTrackingController
+from unilavira_drake.robots.stopping import Footprint
 from unilavira_drake.scenario import MappingConfig, PlanningConfig
 from unilavira_drake.wiring import Wiring
 
@@ -28,10 +30,17 @@ def make_navigation(
 ) -> Diagram:
     """Returns the deterministic half of Robot Action (paper III-B.3) for a ground robot."""
     wiring = Wiring(replace)
-    wiring.add("mapper", lambda: make_mapper(robot, intrinsics, mapping, tick))
-    wiring.add("planner", lambda: make_planner(robot, planning, tick))
-    wiring.add("controller", lambda: make_controller(robot))
-    wiring.add("governor", lambda: make_governor(robot))
+    _add_mapper_and_planner(wiring, robot, intrinsics, mapping, planning, tick)
+    limits = DriveLimits(
+        max_speed=robot.max_speed,
+        max_yaw_rate=robot.max_yaw_rate,
+        max_acceleration=robot.max_acceleration,
+        max_yaw_acceleration=robot.max_yaw_acceleration,
+        period=robot.control_period,
+    )
+    footprint = Footprint(half_length=robot.length / 2, half_width=robot.width / 2)
+    wiring.add("controller", lambda: GroundTrackingController(limits=limits))
+    wiring.add("governor", lambda: Governor(limits=limits, footprint=footprint))
     wiring.connect("mapper", "map", "planner")
     wiring.connect("mapper", "map", "governor")
     wiring.connect("planner", "path", "controller")
@@ -48,3 +57,40 @@ def make_navigation(
     wiring.give_output("planner", "path")
     wiring.give_output("mapper", "map")
     return wiring.build("navigation")
+
+
+def _add_mapper_and_planner(
+    wiring: Wiring,
+    robot: CobotMagic,
+    intrinsics: Intrinsics,
+    mapping: MappingConfig,
+    planning: PlanningConfig,
+    tick: float,
+) -> None:
+    wiring.add(
+        "mapper",
+        lambda: OccupancyMapper(
+            intrinsics=intrinsics,
+            resolution=mapping.resolution,
+            max_range=mapping.max_range,
+            min_height=mapping.min_height,
+            max_height=mapping.max_height,
+            footprint_radius=robot.radius,
+            travel=mapping.travel,
+            turn=math.radians(mapping.turn_degrees),
+            rest_period=mapping.rest_period,
+            period=tick,
+        ),
+    )
+    wiring.add(
+        "planner",
+        lambda: FastMarchingPlanner(
+            radius=robot.radius,
+            turning_radius=robot.turning_radius,
+            snap_distance=planning.snap_distance,
+            tolerance=planning.tolerance,
+            stuck_time=planning.stuck_time,
+            travel_factor=planning.travel_factor,
+            period=tick,
+        ),
+    )

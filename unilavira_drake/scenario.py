@@ -13,6 +13,10 @@ from unilavira_drake.robots.cobot_magic import CobotMagic
 
 SCHEMA_VERSION = 1
 
+# What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both.
+ABLATIONS = ("full", "no_tdm", "no_scb", "no_both")
+RENDERERS = ("vtk",)
+
 
 @dc.dataclass
 class WorldChoice:
@@ -110,6 +114,8 @@ class MemoryConfig:
 class Scenario:
     """A complete, serialisable experiment."""
 
+    # The file's stem, filled in when it is read.
+    name: str = ""
     description: str = ""
     random_seed: int = 0
     world: WorldChoice = dc.field(default_factory=WorldChoice)

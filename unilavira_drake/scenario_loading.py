@@ -41,6 +41,7 @@ def load_scenario(name_or_file: str | Path, overlay: str = "") -> Scenario:
     if overlay.strip():
         scenario = _merged(overlay, "overlay", scenario)
     validate(scenario)
+    scenario.name = scenario.name or path.stem
     return scenario
 
 

@@ -12,9 +12,9 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantValueSource
 
 from unilavira_drake.resources import package_xml
-from unilavira_drake.robots.planar_base import PlanarBase, planar_pose
+from unilavira_drake.robots.planar_base import PlanarBase
 from unilavira_drake.scenario import Scenario
-from unilavira_drake.sensors.rig import add_renderer, add_rgbd_camera, pinhole
+from unilavira_drake.sensors.rig import add_renderer, add_rgbd_camera, front_intrinsics
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.scenery import add_scenery, lights
@@ -29,7 +29,34 @@ def add_navigation_station(
     *,
     X_WB_start: RigidTransform | None = None,
 ) -> Diagram:
-    """Adds the Diagram ``station``: plant, scene graph, front camera and actuation.
+    """Adds the Diagram of ``make_navigation_station`` to a builder.
+
+    Args:
+        builder: of the diagram that gets the station.
+        scenario: what to build.
+        world: read from the scenario when None.
+        X_WB_start: where the robot starts; the chosen task's start when None.
+
+    Raises:
+        ScenarioError: if the world's file cannot be used.
+        TaskError: if the start cannot be used.
+    """
+    start = None
+    if X_WB_start is not None:
+        x, y, _ = X_WB_start.translation()
+        start = (x, y, X_WB_start.rotation().ToRollPitchYaw().yaw_angle())
+    station = make_navigation_station(scenario, world=world, start=start)
+    builder.AddSystem(station)
+    return station
+
+
+def make_navigation_station(
+    scenario: Scenario,
+    *,
+    world: World | None = None,
+    start: tuple[float, float, float] | None = None,
+) -> Diagram:
+    """Returns the Diagram ``station``: plant, scene graph, front camera and actuation.
 
     .. pydrake_system::
         name: station
@@ -48,8 +75,9 @@ def add_navigation_station(
     Images are rendered only when pulled.  ``cheat_X_WB`` is the true pose: for scoring only.
 
     Args:
+        scenario: what to build.
         world: read from the scenario when None.
-        X_WB_start: where the robot starts; the chosen task's start when None.
+        start: x, y (metres) and yaw (radians); the chosen task's start when None.
 
     Raises:
         ScenarioError: if the world's file cannot be used.
@@ -57,21 +85,14 @@ def add_navigation_station(
     """
     if world is None:
         world = load_world(scenario.world.name, mirror=scenario.world.mirror)
-    if X_WB_start is None:
-        start = choose_task(scenario).start
-        X_WB_start = planar_pose(*parse_start(start, world, radius=scenario.robot.radius))
-    station: Diagram = builder.AddSystem(_build_station(scenario, world, X_WB_start))
-    return station
-
-
-def _build_station(scenario: Scenario, world: World, X_WB: RigidTransform) -> Diagram:
+    if start is None:
+        start = parse_start(choose_task(scenario).start, world, radius=scenario.robot.radius)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(scenario.plant, builder)
     add_scenery(plant, scene_graph, world)
     robot = _add_robot(plant, scenario.robot.name)
     plant.Finalize()
-    yaw = X_WB.rotation().ToRollPitchYaw().yaw_angle()
-    plant.SetDefaultPositions(robot, [*X_WB.translation()[:2], yaw])
+    plant.SetDefaultPositions(robot, list(start))
     add_renderer(scene_graph, lights(mirrored=world.mirrored))
     _add_base(builder, plant, robot)
     _add_front_camera(builder, plant, scene_graph, scenario)
@@ -85,7 +106,7 @@ def _build_station(scenario: Scenario, world: World, X_WB: RigidTransform) -> Di
 
 def _add_robot(plant: MultibodyPlant, name: str) -> ModelInstanceIndex:
     parser = Parser(plant)
-    parser.package_map().AddPackageXml(str(package_xml()))
+    parser.package_map().AddPackageXml(package_xml())
     (robot,) = parser.AddModelsFromUrl(f"package://unilavira_drake/robots/{name}.sdf")
     return robot
 
@@ -114,7 +135,7 @@ def _add_front_camera(
         plant,
         scene_graph,
         frame_name="front_camera",
-        intrinsics=pinhole(robot.image_width, robot.image_height, robot.horizontal_fov_degrees),
+        intrinsics=front_intrinsics(robot),
         min_depth=robot.min_depth,
         max_depth=robot.max_depth,
     )

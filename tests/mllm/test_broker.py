@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 
@@ -180,3 +183,33 @@ def test_close_wakes_a_reader(gate: threading.Event) -> None:
     gate.set()
     closer.join(10.0)
     assert "closed" in str(caught[0])
+
+
+WAITS_FOR_EVER = """
+import threading
+from unilavira_drake.mllm.broker import Broker
+from unilavira_drake.mllm.request import MllmRequest
+
+class Backend:
+    def complete(self, request):
+        print("asked", flush=True)
+        threading.Event().wait()
+
+broker = Broker(Backend(), deadline=600.0)
+try:
+    broker.result(MllmRequest(n=1))
+except KeyboardInterrupt:
+    broker.close()
+    print("interrupted", flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends a POSIX signal")
+def test_interrupt_ends_the_wait_and_the_process() -> None:
+    command = [sys.executable, "-c", WAITS_FOR_EVER]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "asked\n"
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=30.0)
+    assert (out, process.returncode) == ("interrupted\n", 0)

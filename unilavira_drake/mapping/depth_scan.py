@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from unilavira_drake.kernels import frozen_view, kernel
+from unilavira_drake.kernels import frozen_view, inlined_kernel, kernel
 
 FREE_STEP = -4
 """Change of log-odds of a cell seen free, tenths."""
@@ -99,9 +99,14 @@ def scan(
             x_hit = x_camera + ahead * (forward_x + slope * forward_y)
             row = math.floor(y_hit * cells) - row0
             column = math.floor(x_hit * cells) - column0
-            inside = 0 <= row < hits.shape[0] and 0 <= column < hits.shape[1]
-            if inside and hits[row, column] < 65535:
-                hits[row, column] += 1
+            _count(hits, row, column)
+
+
+@inlined_kernel
+def _count(hits: NDArray[np.uint16], row: int, column: int) -> None:
+    inside = 0 <= row < hits.shape[0] and 0 <= column < hits.shape[1]
+    if inside and hits[row, column] < 65535:
+        hits[row, column] += 1
 
 
 @kernel

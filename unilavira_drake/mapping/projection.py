@@ -170,9 +170,7 @@ def _surface(
     return Projection(pixel=center if on_surface else pixel, depth=d)
 
 
-def _in_world(
-    found: Projection, intrinsics: Intrinsics, X_WC: NDArray[np.float64]
-) -> Projection:
+def _in_world(found: Projection, intrinsics: Intrinsics, X_WC: NDArray[np.float64]) -> Projection:
     if found.pixel is None or found.depth is None:
         return found
     p_WG = project_to_world(found.pixel, found.depth, intrinsics=intrinsics, X_WC=X_WC)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -47,6 +48,10 @@ class EpisodeMetrics(Message):
     def ended(self) -> bool:
         """Whether the episode has ended."""
         return bool(self.cause)
+
+    def interrupted(self) -> EpisodeMetrics:
+        """Returns these metrics as those of a run that a person stopped."""
+        return dataclasses.replace(self, cause="interrupted")
 
     @property
     def position(self) -> tuple[float, float]:

@@ -1,1 +1,1 @@
-"""Planning: from a map and a goal to a path."""
+"""Planning: from an occupancy map and a goal to a path on free floor."""

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from unilavira_drake.kernels import kernel
+from unilavira_drake.kernels import inlined_kernel, kernel
 
 MAX_SLOWNESS = 7.0
 """Slowness lies in [1, MAX_SLOWNESS]: one step must stay within the ring of buckets."""
@@ -22,7 +22,7 @@ STOP_MARGIN = 4.0
 """An early stop still settles this much beyond the stop cell, in units of the field."""
 
 _BUCKETS = 16
-_PER_CELL = 2.0
+_PER_CELL = np.float32(2.0)
 """Buckets per unit of the field."""
 
 
@@ -67,10 +67,8 @@ def distance_field(
     return np.ascontiguousarray(times[1:-1, 1:-1])
 
 
-@kernel
-def _update(
-    times: NDArray[np.float32], i: int, width: int, cost: np.float32
-) -> np.float32:
+@inlined_kernel
+def _update(times: NDArray[np.float32], i: int, width: int, cost: np.float32) -> np.float32:
     """Returns the upwind solution at one cell from its four neighbours."""
     a = min(times[i - 1], times[i + 1])
     b = min(times[i - width], times[i + width])
@@ -93,15 +91,14 @@ def _march(
     end: int,
 ) -> None:
     """Fills ``times`` of flat grids that are padded with a blocked ring."""
-    queue = np.empty((_BUCKETS, 1024), np.int32)
+    queue = np.empty((_BUCKETS, len(starts) + 1024), np.int32)
     count = np.zeros(_BUCKETS, np.int64)
     for start in starts:
-        if not blocked[start] and times[start] > 0.0:
+        if not blocked[start]:
             times[start] = 0.0
-            queue, count = _push(queue, count, 0, start)
-    steps = np.array([-1, 1, -width, width])
-    current = 0
-    empty = 0
+            queue[0, count[0]] = start
+            count[0] += 1
+    current, empty, fullest = 0, 0, 0
     while empty < _BUCKETS:
         slot = current & (_BUCKETS - 1)
         if count[slot] == 0:
@@ -109,46 +106,68 @@ def _march(
             empty += 1
             continue
         empty = 0
-        if end >= 0 and current / _PER_CELL > times[end] + STOP_MARGIN:
+        if end >= 0 and current > (times[end] + STOP_MARGIN) * _PER_CELL:
             break
         while count[slot] > 0:
+            if fullest + 4 > queue.shape[1]:
+                queue = _larger(queue)
             count[slot] -= 1
-            i = queue[slot, count[slot]]
-            time = times[i]
-            if int(time * _PER_CELL) != current:
-                continue  # its value fell since, and it was taken up under the new one
-            for step in steps:
-                j = i + step
-                if blocked[j] or times[j] <= time:
-                    continue
-                new = _update(times, j, width, cost[j])
-                old = times[j]
-                if new < old:
-                    times[j] = new
-                    bucket = max(int(new * _PER_CELL), current)
-                    queued = old < np.inf and int(old * _PER_CELL) == bucket
-                    if not queued or bucket == current:
-                        queue, count = _push(queue, count, bucket & (_BUCKETS - 1), j)
+            i = np.int64(queue[slot, count[slot]])
+            # Otherwise its value fell since, and it was taken up under the new one.
+            if np.int64(times[i] * _PER_CELL) == current:
+                fullest = max(
+                    fullest, _relax(blocked, cost, width, times, i, current, queue, count)
+                )
     if end >= 0:
-        settled = np.float32(current / _PER_CELL)
-        for i in range(times.size):
-            if times[i] > settled:
-                times[i] = np.inf
+        _forget_beyond(times, np.float32(current / _PER_CELL))
+
+
+@inlined_kernel
+def _relax(
+    blocked: NDArray[np.bool_],
+    cost: NDArray[np.float32],
+    width: int,
+    times: NDArray[np.float32],
+    i: int,
+    current: int,
+    queue: NDArray[np.int32],
+    count: NDArray[np.int64],
+) -> int:
+    """Updates the four neighbours of a cell, and returns the largest bucket filled."""
+    fullest = 0
+    for step in (-1, 1, -width, width):
+        j = i + step
+        old = times[j]
+        if blocked[j] or old <= times[i]:
+            continue
+        new = _update(times, j, width, cost[j])
+        if new >= old:
+            continue
+        times[j] = new
+        bucket = max(np.int64(new * _PER_CELL), current)
+        # Queued under the same bucket already, which is still to come.
+        if bucket != current and old < np.inf and np.int64(old * _PER_CELL) == bucket:
+            continue
+        slot = bucket & (_BUCKETS - 1)
+        queue[slot, count[slot]] = j
+        count[slot] += 1
+        fullest = max(fullest, count[slot])
+    return fullest
 
 
 @kernel
-def _push(
-    queue: NDArray[np.int32], count: NDArray[np.int64], slot: int, cell: int
-) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Appends a cell to a bucket, and returns the queue, which may have grown."""
-    capacity = queue.shape[1]
-    if count[slot] == capacity:
-        larger = np.empty((queue.shape[0], 2 * capacity), np.int32)
-        larger[:, :capacity] = queue
-        queue = larger
-    queue[slot, count[slot]] = cell
-    count[slot] += 1
-    return queue, count
+def _larger(queue: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Returns a copy of the queue with twice the capacity."""
+    larger = np.empty((queue.shape[0], 2 * queue.shape[1]), np.int32)
+    larger[:, : queue.shape[1]] = queue
+    return larger
+
+
+@kernel
+def _forget_beyond(times: NDArray[np.float32], settled: np.float32) -> None:
+    for i in range(times.size):
+        if times[i] > settled:
+            times[i] = np.inf
 
 
 def warm_up() -> None:

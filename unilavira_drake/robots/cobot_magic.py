@@ -16,6 +16,9 @@ class CobotMagic:
     max_yaw_rate: float = 1.5
     max_acceleration: float = 1.0
     max_yaw_acceleration: float = 3.0
+    # Footprint of the base.
+    length: float = 0.69
+    width: float = 0.57
     # Radius that the planner keeps free around the base's centre.
     radius: float = 0.36
     # Radius swept when the base turns in place; goals keep this clearance where they can.

@@ -8,7 +8,6 @@ from typing import NamedTuple
 from unilavira_drake.kernels import kernel
 
 
-
 class DriveLimits(NamedTuple):
     """What a differential base may do in one control period."""
 

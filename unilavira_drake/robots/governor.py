@@ -70,8 +70,9 @@ class Governor(LeafSystem):
         self._map = message_input(self, "map", OccupancyMap())
         self._pose = pose_input(self, "pose_estimate")
         self._twist = vector_input(self, "twist", 6)
-        self._command_index = self.DeclareDiscreteState(3)
-        self.DeclareStateOutputPort("base_command", self._command_index)
+        index = self.DeclareDiscreteState(3)
+        self._command_index = int(index)
+        self.DeclareStateOutputPort("base_command", index)
         self.DeclarePeriodicDiscreteUpdateEvent(limits.period, offset, self._update)
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
@@ -94,7 +95,8 @@ class Governor(LeafSystem):
             # Braking is limited too, so a late obstacle may leave more than is allowed.
             slowest = max(abs(old_speed) - step, 0.0) if speed * old_speed > 0.0 else 0.0
             speed = math.copysign(min(abs(speed), max(allowed, slowest)), speed)
-        discrete_state.set_value(self._command_index, np.array([speed, 0.0, rate]))
+        command = np.array([speed, 0.0, rate])
+        discrete_state.set_value(self._command_index, command)  # type: ignore[arg-type]
 
     def _allowed_speed(self, context: Context, speed: float, rate: float) -> float:
         """How fast the base may go along the arc of this command, m/s, never negative."""

@@ -12,6 +12,8 @@ from unilavira_drake.ports import message_input, pose_input, vector_input
 from unilavira_drake.robots.drive_limits import DriveLimits, Reaction, approach
 from unilavira_drake.robots.ground_tracking import track_path, turn_rate, warm_up
 
+DEFAULT_REACTION = Reaction()
+
 
 class GroundTrackingController(LeafSystem):
     """Tracks with a differential base; its state is the previous command.
@@ -39,7 +41,7 @@ class GroundTrackingController(LeafSystem):
         reaction: how fast the base obeys.
     """
 
-    def __init__(self, *, limits: DriveLimits, reaction: Reaction = Reaction()) -> None:
+    def __init__(self, *, limits: DriveLimits, reaction: Reaction = DEFAULT_REACTION) -> None:
         super().__init__()
         warm_up()
         self._limits = limits
@@ -48,8 +50,9 @@ class GroundTrackingController(LeafSystem):
         self._sweep = message_input(self, "sweep", Sweep())
         self._pose = pose_input(self, "pose_estimate")
         self._twist = vector_input(self, "twist", 6)
-        self._command_index = self.DeclareDiscreteState(4)
-        self.DeclareStateOutputPort("desired_command", self._command_index)
+        index = self.DeclareDiscreteState(4)
+        self._command_index = int(index)
+        self.DeclareStateOutputPort("desired_command", index)
         self.DeclarePeriodicDiscreteUpdateEvent(limits.period, 0.0, self._update)
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
@@ -60,11 +63,11 @@ class GroundTrackingController(LeafSystem):
         follow = len(path.p_WP) > 0 and path.n >= sweep.n
         if follow or sweep.active:
             X_WB = self._pose(context).GetAsMatrix34()
-            yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
+            x, y, yaw = X_WB[0, 3], X_WB[1, 3], math.atan2(X_WB[1, 0], X_WB[0, 0])
             yaw_rate = self._twist(context)[2]
         if follow:
             speed, rate = track_path(
-                path.p_WP, X_WB[0, 3], X_WB[1, 3], yaw, yaw_rate, speed, rate, self._reaction, limits
+                path.p_WP, x, y, yaw, yaw_rate, speed, rate, self._reaction, limits
             )
         else:
             speed = approach(speed, 0.0, limits.max_acceleration * limits.period)
@@ -72,6 +75,5 @@ class GroundTrackingController(LeafSystem):
                 rate = turn_rate(sweep.heading - yaw, yaw_rate, rate, self._reaction, limits)
             else:
                 rate = approach(rate, 0.0, limits.max_yaw_acceleration * limits.period)
-        discrete_state.set_value(
-            self._command_index, np.array([speed, 0.0, rate, context.get_time()])
-        )
+        command = np.array([speed, 0.0, rate, context.get_time()])
+        discrete_state.set_value(self._command_index, command)  # type: ignore[arg-type]

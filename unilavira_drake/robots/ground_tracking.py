@@ -69,6 +69,8 @@ def project(p_WP: NDArray[np.float64], x: float, y: float) -> tuple[int, float, 
 
     Args:
         p_WP: (k, 2) float64, k >= 1, metres; of one point the segment is 0.
+        x: of the point, metres.
+        y: of the point, metres.
     """
     segment, along = 0, 0.0
     best = math.hypot(p_WP[0, 0] - x, p_WP[0, 1] - y)
@@ -79,9 +81,7 @@ def project(p_WP: NDArray[np.float64], x: float, y: float) -> tuple[int, float, 
             continue
         s = ((x - p_WP[i, 0]) * dx + (y - p_WP[i, 1]) * dy) / length
         s = min(max(s, 0.0), length)
-        distance = math.hypot(
-            p_WP[i, 0] + s * dx / length - x, p_WP[i, 1] + s * dy / length - y
-        )
+        distance = math.hypot(p_WP[i, 0] + s * dx / length - x, p_WP[i, 1] + s * dy / length - y)
         if distance < best:
             segment, along, best = i, s, distance
     return segment, along, best
@@ -141,6 +141,17 @@ def _lookahead(p_WP: NDArray[np.float64], segment: int, along: float, yaw: float
 
 
 @kernel
+def _speed_limit(
+    lookahead: float, curvature: float, angle: float, way: float, limits: DriveLimits
+) -> float:
+    """The speed at which the base can still turn as the path does and stop at its end, m/s."""
+    bend = max(abs(curvature), 1e-6)
+    speed = min(limits.max_speed, lookahead / LOOKAHEAD_TIME, 0.8 * limits.max_yaw_rate / bend)
+    speed = min(speed, math.sqrt(LATERAL_ACCELERATION / bend)) * max(math.cos(angle), 0.3)
+    return min(speed, braking_speed(way, 0.8 * limits.max_acceleration, limits.period))
+
+
+@kernel
 def track_path(
     p_WP: NDArray[np.float64],
     x: float,
@@ -181,15 +192,11 @@ def track_path(
     bearing = math.atan2(target_y - y, target_x - x) - yaw
     angle = math.atan2(math.sin(bearing), math.cos(bearing))
     if abs(angle) > (STOP_ANGLE if previous_speed > 2.0 * slower else START_ANGLE):
-        if previous_speed <= 2.0 * slower or abs(angle) > STOP_ANGLE:
-            rate = turn_rate(angle, yaw_rate, previous_rate, reaction, limits)
-            return approach(previous_speed, 0.0, slower), rate
+        rate = turn_rate(angle, yaw_rate, previous_rate, reaction, limits)
+        return approach(previous_speed, 0.0, slower), rate
     curvature = 2.0 * math.sin(angle) / max(distance, MIN_LOOKAHEAD)
-    bend = max(abs(curvature), 1e-6)
-    speed = min(limits.max_speed, lookahead / LOOKAHEAD_TIME, 0.8 * limits.max_yaw_rate / bend)
-    speed = min(speed, math.sqrt(LATERAL_ACCELERATION / bend)) * max(math.cos(angle), 0.3)
-    way = max(max(rest, to_end) - previous_speed * (reaction.delay + reaction.lag), 0.2 * END_DISTANCE)
-    speed = min(speed, braking_speed(way, 0.8 * limits.max_acceleration, limits.period))
+    way = max(rest, to_end) - previous_speed * (reaction.delay + reaction.lag)
+    speed = _speed_limit(lookahead, curvature, angle, max(way, 0.2 * END_DISTANCE), limits)
     speed = approach(previous_speed, speed, slower)
     return speed, approach(previous_rate, curvature * speed, turn_step)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import AbstractValue, Value
+from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, LeafSystem
 
 from unilavira_drake.ports import vector_input
 
@@ -55,17 +56,17 @@ class PlanarBase(LeafSystem):
             "twist", BasicVector(6), self._calc_twist, prerequisites_of_calc=state_ticket
         )
 
-    def _calc_desired(self, context: Context, output: BasicVector) -> None:
+    def _calc_desired(self, context: Any, output: Any) -> None:
         command = self._command(context)
         yaw = float(self._joint_state(context)[2])
         velocity = world_velocity(command, yaw, holonomic=self._holonomic)
         output.SetFromVector(np.concatenate((np.zeros(3), velocity)))
 
-    def _calc_pose(self, context: Context, output: Value[RigidTransform]) -> None:
+    def _calc_pose(self, context: Any, output: Any) -> None:
         x, y, yaw = self._joint_state(context)[:3]
         output.set_value(planar_pose(float(x), float(y), float(yaw)))
 
-    def _calc_twist(self, context: Context, output: BasicVector) -> None:
+    def _calc_twist(self, context: Any, output: Any) -> None:
         _, _, yaw, vx, vy, wz = self._joint_state(context)
         c, s = math.cos(yaw), math.sin(yaw)
         output.SetFromVector([0.0, 0.0, wz, c * vx + s * vy, c * vy - s * vx, 0.0])
@@ -84,4 +85,5 @@ def world_velocity(
 def planar_pose(x: float, y: float, yaw: float) -> RigidTransform:
     """Returns X_WB of a base on the floor."""
     c, s = math.cos(yaw), math.sin(yaw)
-    return RigidTransform(np.array([[c, -s, 0.0, x], [s, c, 0.0, y], [0.0, 0.0, 1.0, 0.0]]))
+    matrix: Any = np.array([[c, -s, 0.0, x], [s, c, 0.0, y], [0.0, 0.0, 1.0, 0.0]])
+    return RigidTransform(matrix)

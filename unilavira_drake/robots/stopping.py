@@ -85,10 +85,10 @@ def free_distance(
     """
     rows, columns = log_odds.shape
     reach = math.hypot(footprint.half_length + footprint.standoff, footprint.half_width) + horizon
-    row_0 = max(int(math.floor((y - reach - origin[1]) / resolution)), 0)
-    row_1 = min(int(math.floor((y + reach - origin[1]) / resolution)) + 1, rows)
-    column_0 = max(int(math.floor((x - reach - origin[0]) / resolution)), 0)
-    column_1 = min(int(math.floor((x + reach - origin[0]) / resolution)) + 1, columns)
+    row_0 = max(math.floor((y - reach - origin[1]) / resolution), 0)
+    row_1 = min(math.floor((y + reach - origin[1]) / resolution) + 1, rows)
+    column_0 = max(math.floor((x - reach - origin[0]) / resolution), 0)
+    column_1 = min(math.floor((x + reach - origin[0]) / resolution) + 1, columns)
     # Going backwards is going forwards with the base seen from behind: x and y change sign.
     sign = -1.0 if backwards else 1.0
     c, s = sign * math.cos(yaw), sign * math.sin(yaw)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any, Protocol
 
 from pydrake.geometry import (
     ClippingRange,
@@ -25,6 +26,19 @@ from unilavira_drake.messages import Intrinsics
 
 RENDERER = "vtk"
 """Name of the render engine in the scene graph."""
+
+
+class CameraModel(Protocol):
+    """A robot's front camera: image size in pixels and field of view in degrees."""
+
+    image_width: int
+    image_height: int
+    horizontal_fov_degrees: float
+
+
+def front_intrinsics(robot: CameraModel) -> Intrinsics:
+    """Returns the intrinsics of a robot's front camera."""
+    return pinhole(robot.image_width, robot.image_height, robot.horizontal_fov_degrees)
 
 
 def pinhole(width: int, height: int, horizontal_fov_degrees: float) -> Intrinsics:
@@ -60,8 +74,8 @@ def add_rgbd_camera(
     Returns:
         The sensor, and X_BC, the camera's pose in the body that carries it.
     """
-    frame = plant.GetFrameByName(frame_name)
-    X_BC = frame.GetFixedPoseInBodyFrame()
+    frame: Any = plant.GetFrameByName(frame_name)
+    X_BC: RigidTransform = frame.GetFixedPoseInBodyFrame()
     core = RenderCameraCore(
         RENDERER,
         CameraInfo(
@@ -76,7 +90,7 @@ def add_rgbd_camera(
         RigidTransform(),
     )
     body_frame = plant.GetBodyFrameIdOrThrow(frame.body().index())
-    sensor = builder.AddNamedSystem(
+    sensor: Any = builder.AddNamedSystem(
         frame_name,
         RgbdSensor(
             body_frame,
@@ -87,5 +101,3 @@ def add_rgbd_camera(
     )
     builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
     return sensor, X_BC
-
-

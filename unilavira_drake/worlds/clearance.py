@@ -30,6 +30,7 @@ def clearance(world: World, p_WP: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the distance from floor points to the nearest obstacle; 0 inside one.
 
     Args:
+        world: its walls and things.
         p_WP: (k, 2) float64, metres in the world.
 
     Returns:

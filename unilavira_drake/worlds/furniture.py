@@ -172,11 +172,9 @@ CATEGORIES = tuple(sorted(PARTS))
 def furniture_boxes(
     category: str, x: float, y: float, yaw: float, height: float = 0.0
 ) -> tuple[Box, ...]:
-    """Returns the boxes of a thing that stands at (x, y), turned by ``yaw`` (radians).
+    """Returns the boxes of a thing of a category that stands at (x, y), turned by ``yaw``.
 
-    Args:
-        category: one of ``CATEGORIES``.
-        height: of the surface it stands on, metres.
+    Metres and radians; ``height`` is that of the surface it stands on.
 
     Raises:
         KeyError: if the category is unknown.

@@ -17,7 +17,7 @@ from unilavira_drake.worlds.furniture import CATEGORIES, furniture_boxes
 from unilavira_drake.worlds.palette import PALETTE
 from unilavira_drake.worlds.schema import DoorEntry, ObjectEntry, RoomEntry, WorldFile
 from unilavira_drake.worlds.structure import Doorway, doorway, frame_boxes, walls
-from unilavira_drake.worlds.world import LabelEntry, Room, World, WorldObject
+from unilavira_drake.worlds.world import Box, LabelEntry, Room, World, WorldObject
 
 _LISTS = {"rooms": RoomEntry, "doors": DoorEntry, "objects": ObjectEntry}
 
@@ -26,16 +26,15 @@ def load_world(name_or_file: str, *, mirror: bool = False) -> World:
     """Reads ``models/worlds/NAME.yaml``, or a file that ends in ``.yaml``.
 
     Args:
+        name_or_file: e.g. ``flat``.
         mirror: negates y of everything, and every yaw.
 
     Raises:
         ScenarioError: names file, key, value and remedy.
     """
     path = _find(name_or_file)
-    entries = _read(path)
-    if mirror:
-        _mirror(entries)
-    return dc.replace(_build(entries, str(path)), mirrored=mirror)
+    world = _build(_read(path), str(path))
+    return _mirrored(world) if mirror else world
 
 
 def _find(name_or_file: str) -> Path:
@@ -68,7 +67,8 @@ def _read(path: Path) -> WorldFile:
             named = isinstance(entry, dict) and "name" in entry
             label = repr(entry["name"]) if named else f"{index + 1}"
             _check(entry, schema, f"{path}: {key}: entry {label}")
-    return _typed(WorldFile, text, str(path))
+    entries: WorldFile = _typed(WorldFile, text, str(path))
+    return entries
 
 
 def _check(data: Any, schema: type, place: str) -> None:
@@ -87,20 +87,30 @@ def _check(data: Any, schema: type, place: str) -> None:
 
 def _typed(schema: type, text: str, place: str) -> Any:
     try:
-        return yaml_load_typed(schema=schema, data=text)
+        return yaml_load_typed(schema=schema, data=text)  # type: ignore[no-untyped-call]
     except (RuntimeError, ValueError, TypeError, AttributeError) as error:
         raise ScenarioError(f"{place}: wrong type: {error}") from None
 
 
-def _mirror(entries: WorldFile) -> None:
-    for room in entries.rooms:
-        if len(room.rectangle) == 4:
-            x_min, y_min, x_max, y_max = room.rectangle
-            room.rectangle = [x_min, -y_max, x_max, -y_min]
-    for placed in (*entries.doors, *entries.objects):
-        placed.position = [-value if i == 1 else value for i, value in enumerate(placed.position)]
-    for thing in entries.objects:
-        thing.yaw_degrees = -thing.yaw_degrees
+def _mirrored(world: World) -> World:
+    """Returns the world with y negated; boxes and rectangles stay boxes and rectangles."""
+
+    def flip(box: Box) -> Box:
+        x, y, z = box.center
+        return dc.replace(box, center=(x, -y, z), yaw=-box.yaw)
+
+    rooms = []
+    for room in world.rooms:
+        x_min, y_min, x_max, y_max = room.rectangle
+        rooms.append(dc.replace(room, rectangle=(x_min, -y_max, x_max, -y_min)))
+    things = (dc.replace(thing, boxes=tuple(map(flip, thing.boxes))) for thing in world.objects)
+    return dc.replace(
+        world,
+        rooms=tuple(rooms),
+        objects=tuple(things),
+        walls=tuple(map(flip, world.walls)),
+        mirrored=True,
+    )
 
 
 def _build(entries: WorldFile, place: str) -> World:
@@ -174,9 +184,7 @@ def _thing(entry: ObjectEntry, rooms: dict[str, Room], place: str) -> WorldObjec
     return WorldObject(entry.name, entry.category, entry.color, entry.room, boxes)
 
 
-def _opening(
-    entry: DoorEntry, rooms: dict[str, Room], entries: WorldFile, place: str
-) -> Doorway:
+def _opening(entry: DoorEntry, rooms: dict[str, Room], entries: WorldFile, place: str) -> Doorway:
     place = f"{place}: doors: {entry.name!r}"
     if entry.color not in PALETTE:
         raise ScenarioError(unknown_name("color", entry.color, PALETTE, place))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,9 +81,10 @@ def add_scenery(plant: MultibodyPlant, scene_graph: SceneGraph, world: World) ->
     boxes = [("wall", box) for box in world.walls]
     boxes += [(thing.name, box) for thing in world.objects for box in thing.boxes]
     for index, (name, box) in enumerate(boxes):
+        p_WB: Any = box.center
         plant.RegisterCollisionGeometry(
             plant.world_body(),
-            RigidTransform(RollPitchYaw(0, 0, box.yaw), box.center),
+            RigidTransform(RollPitchYaw(0, 0, box.yaw), p_WB),
             BoxShape(*box.size),
             f"{name}_{index}",
             friction,
@@ -146,7 +148,9 @@ def _register(plant: MultibodyPlant, scene_graph: SceneGraph, surface: _Surface)
         illustration = IllustrationProperties()
         illustration.AddProperty("phong", "diffuse", rgba)
         instance.set_illustration_properties(illustration)
-    scene_graph.RegisterAnchoredGeometry(plant.get_source_id(), instance)
+    source = plant.get_source_id()
+    assert source is not None
+    scene_graph.RegisterAnchoredGeometry(source, instance)
 
 
 def _obj(surface: _Surface) -> str:

@@ -22,6 +22,8 @@ def parse_start(text: str, world: World, *, radius: float) -> tuple[float, float
     negated with it.
 
     Args:
+        text: ROOM or X,Y,YAW.
+        world: where the start must be free.
         radius: the robot's, metres; a start keeps at least this clearance.
 
     Raises:
@@ -96,6 +98,4 @@ def _check_free(text: str, x: float, y: float, world: World, radius: float) -> N
         near_x, near_y = free[np.argmin(np.hypot(free[:, 0] - x, free[:, 1] - y))]
         sign = -1.0 if world.mirrored else 1.0
         remedy = f"the nearest free place is {near_x:.2f},{sign * near_y:.2f}, or {remedy}"
-    raise TaskError(
-        f"start: {text!r} is {where} and the robot needs {radius:.2f} m; {remedy}."
-    )
+    raise TaskError(f"start: {text!r} is {where} and the robot needs {radius:.2f} m; {remedy}.")

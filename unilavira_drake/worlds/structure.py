@@ -130,7 +130,9 @@ def _on_line(line: _Line, openings: tuple[Doorway, ...]) -> list[Doorway]:
 
 def _borders(room: Room, along_x: bool, across: float, low: float, high: float) -> bool:
     x_min, y_min, x_max, y_max = room.rectangle
-    sides, start, end = ((y_min, y_max), x_min, x_max) if along_x else ((x_min, x_max), y_min, y_max)
+    sides, start, end = (
+        ((y_min, y_max), x_min, x_max) if along_x else ((x_min, x_max), y_min, y_max)
+    )
     return start <= low and high <= end and any(abs(across - side) < 1e-6 for side in sides)
 
 

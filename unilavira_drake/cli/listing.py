@@ -1,0 +1,83 @@
+"""``unilavira scenarios`` and ``unilavira ports``: what there is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+import typer
+from pydrake.systems.framework import (
+    Diagram,
+    InputPortIndex,
+    OutputPortIndex,
+    PortDataType,
+    System,
+)
+from rich.console import Console
+from rich.table import Table
+
+from unilavira_drake.diagram import make_navigation_diagram
+from unilavira_drake.scenario_checks import robot_names
+from unilavira_drake.scenario_loading import load_scenario, scenario_names
+from unilavira_drake.worlds.load import load_world
+
+_OPAQUE = "station"
+"""Drake's own plant and renderer are inside; its ports say what there is to know."""
+
+
+def scenarios() -> None:
+    """Lists scenarios with their named tasks, worlds and robots."""
+    console = Console(soft_wrap=True, highlight=False)
+    for name in scenario_names():
+        scenario = load_scenario(name)
+        world = load_world(scenario.world.name)
+        rooms = ", ".join(room.kind for room in world.rooms)
+        console.print(f"scenario {name}: {scenario.description}", markup=False)
+        console.print(f"  world {world.name}: {rooms}", markup=False)
+        for task_name, task in scenario.tasks.items():
+            chosen = " (default)" if task_name == scenario.default_task else ""
+            console.print(f"  @{task_name}{chosen} [{task.family}] {task.text}", markup=False)
+    console.print(f"robots: {', '.join(robot_names())}", markup=False)
+
+
+def ports(
+    scenario: Annotated[str, typer.Option(help="Name or file of the scenario.")] = "flat",
+    dot: Annotated[bool, typer.Option("--dot", help="Graphviz text instead of a table.")] = False,
+    depth: Annotated[int, typer.Option(help="Levels of detail in the Graphviz text.")] = 2,
+) -> None:
+    """Shows every System with its ports, from the built Diagram."""
+    diagram = make_navigation_diagram(load_scenario(scenario), on_message=_ignore)
+    if dot:
+        print(diagram.GetGraphvizString(max_depth=depth))
+        return
+    table = Table("system", "direction", "port", "carries")
+    for row in _rows(diagram):
+        table.add_row(*row)
+    Console(width=None).print(table)
+
+
+def _ignore(t: float, system: str, event: str, message: object) -> None:
+    pass
+
+
+def _rows(diagram: Diagram, prefix: str = "") -> Iterator[tuple[str, str, str, str]]:
+    for system in diagram.GetSystems():
+        name = f"{prefix}{system.get_name()}"
+        yield from _port_rows(name, system)
+        if isinstance(system, Diagram) and system.get_name() != _OPAQUE:
+            yield from _rows(system, f"{name}.")
+
+
+def _port_rows(name: str, system: System) -> Iterator[tuple[str, str, str, str]]:
+    for index in range(system.num_input_ports()):
+        port = system.get_input_port(InputPortIndex(index))
+        vector = port.get_data_type() == PortDataType.kVectorValued
+        carries = f"vector {port.size()}" if vector else "message"
+        yield name, "in", port.get_name(), carries
+    for index in range(system.num_output_ports()):
+        port = system.get_output_port(OutputPortIndex(index))
+        if port.get_data_type() == PortDataType.kVectorValued:
+            yield name, "out", port.get_name(), f"vector {port.size()}"
+        else:
+            kind = type(port.Allocate().get_value()).__name__
+            yield name, "out", port.get_name(), kind

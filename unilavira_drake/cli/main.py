@@ -1,0 +1,53 @@
+"""The command ``unilavira``: its subcommands, and what its exit codes mean.
+
+=====  ==========================================================================
+code   meaning
+=====  ==========================================================================
+0      the episode ended, also without success
+2      bad input: the message names place, value and remedy
+3      the machine or a service is not able (no renderer, model unreachable)
+130    interrupted; what was done is kept
+=====  ==========================================================================
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from unilavira_drake.cli.doctor import doctor
+from unilavira_drake.cli.listing import ports, scenarios
+from unilavira_drake.cli.run import run
+from unilavira_drake.errors import InfrastructureError, InputError
+
+BAD_INPUT, INFRASTRUCTURE = 2, 3
+
+app = typer.Typer(
+    name="unilavira",
+    help="Robots that follow a person's words, simulated with Drake.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+for command in (run, ports, scenarios, doctor):
+    app.command()(command)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command and returns its exit code."""
+    try:
+        app(args=None if arguments is None else list(arguments), prog_name="unilavira")
+    except SystemExit as done:
+        return done.code if isinstance(done.code, int) else int(done.code is not None)
+    except InputError as error:
+        return _failed(error, BAD_INPUT)
+    except InfrastructureError as error:
+        return _failed(error, INFRASTRUCTURE)
+    return 0
+
+
+def _failed(error: Exception, code: int) -> int:
+    print(f"unilavira: {error}", file=sys.stderr)
+    return code

@@ -1,0 +1,128 @@
+"""Live progress: each decision with its reason, its target and the TODO list."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Any
+
+from rich.console import Console
+from rich.status import Status
+from rich.text import Text
+
+from unilavira_drake.messages import (
+    Goal,
+    LanguageAction,
+    NavigationStatus,
+    Panorama,
+    TodoItem,
+    TodoList,
+    VisionAction,
+)
+from unilavira_drake.messages.metrics import EpisodeMetrics
+from unilavira_drake.mllm.request import Mllm, MllmRequest
+from unilavira_drake.task_choice import EpisodeTask
+
+_INDENT = " " * 5
+
+
+class Progress:
+    """Prints what happens; on a terminal its last line says what goes on just now."""
+
+    def __init__(self, console: Console | None = None) -> None:
+        self.console = console or Console(highlight=False, soft_wrap=False)
+        self._status: Status | None = None
+        self._began = time.perf_counter()
+        self._todo: tuple[TodoItem, ...] = ()
+
+    def __enter__(self) -> Progress:
+        """Begins to measure wall time, and shows the live line on a terminal."""
+        self._began = time.perf_counter()
+        if self.console.is_terminal:
+            self._status = self.console.status("building the world")
+            self._status.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Ends the live line."""
+        if self._status is not None:
+            self._status.stop()
+
+    def introduce(self, *, language: Mllm, vision: Mllm, task: EpisodeTask) -> None:
+        """Says what the models are, and what the task is."""
+        if language.description == vision.description:
+            self._line(f"model: {language.description}", "bold")
+        else:
+            self._line(f"language model: {language.description}", "bold")
+            self._line(f"vision model: {vision.description}", "bold")
+        name = f" @{task.name}" if task.name else ""
+        scored = f"scored against {task.goal}" if task.goal else "not scored"
+        self._line(f"task{name} ({task.spec.family}, {scored}): {task.spec.text}")
+
+    def record(self, t: float, system: str, event: str, message: Any) -> None:
+        """Takes a new message at a time, simulated seconds."""
+        if isinstance(message, LanguageAction):
+            self._decision(t, message)
+        elif isinstance(message, TodoList):
+            self._todo_list(message)
+        elif isinstance(message, VisionAction):
+            found = message.target_desc if not message.reason else message.reason
+            self._line(f"{_INDENT}target: {found}")
+        elif isinstance(message, NavigationStatus) and message.state == "failed":
+            self._line(f"{_INDENT}failed: {message.reason}", "red")
+        self._now(t, message)
+
+    def _decision(self, t: float, action: LanguageAction) -> None:
+        wall = time.perf_counter() - self._began
+        what = f"{action.tool} {action.argument}".strip()
+        self._line(
+            f"{action.n:>3}. {action.call:<12} {what:<16} simulated {t:6.1f} s  wall {wall:5.1f} s",
+            "bold cyan",
+        )
+        reasoning = action.reasoning_action or action.reason or action.progress_analysis
+        if reasoning:
+            self._line(f"{_INDENT}{reasoning}", "dim")
+        if action.answer:
+            self._line(f"{_INDENT}answer: {action.answer}", "bold")
+
+    def _todo_list(self, todo: TodoList) -> None:
+        if todo.items != self._todo:
+            for item in todo.items:
+                done = item.status == "completed"
+                evidence = f" ({item.result})" if done and item.result else ""
+                self._line(
+                    f"{_INDENT}[{'x' if done else ' '}] {item.content}{evidence}",
+                    "green" if done else "",
+                )
+            self._todo = todo.items
+        for sentence in todo.feedback:
+            self._line(f"{_INDENT}! {sentence}", "yellow")
+
+    def _line(self, text: str, style: str = "") -> None:
+        line = Text(" ".join(text.split("\n")), style=style)
+        self.console.print(line, overflow="ellipsis", no_wrap=text.startswith(_INDENT))
+
+    def _now(self, t: float, message: Any) -> None:
+        if self._status is None:
+            return
+        doing = _doing(message)
+        if doing:
+            wall = time.perf_counter() - self._began
+            self._status.update(Text(f"{doing}  simulated {t:.1f} s, wall {wall:.1f} s"))
+
+
+def _doing(message: Any) -> str:
+    if isinstance(message, MllmRequest):
+        return f"the {message.role} model thinks ({message.call})"
+    if isinstance(message, Goal) and message.kind == "go":
+        return "driving"
+    if isinstance(message, EpisodeMetrics):
+        return f"driving, {message.path_length:.1f} m so far"
+    if isinstance(message, NavigationStatus) and message.terminal:
+        return "looking around"
+    return "thinking" if isinstance(message, Panorama) else ""

@@ -1,0 +1,119 @@
+"""``unilavira run``: one episode, watched live."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from unilavira_drake.cli.progress import Progress
+from unilavira_drake.cli.summary import print_summary
+from unilavira_drake.episode import run_episode
+from unilavira_drake.errors import InputError
+from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.recording.run_folder import fresh_folder
+from unilavira_drake.rendering_check import check_rendering
+from unilavira_drake.scenario import Scenario
+from unilavira_drake.scenario_loading import load_scenario, overlay_from_settings
+from unilavira_drake.task_choice import choose_task
+from unilavira_drake.tasks import checked_task
+
+INTERRUPTED = 130
+
+
+def _option(help_text: str, metavar: str) -> typer.models.OptionInfo:
+    option: typer.models.OptionInfo = typer.Option(
+        help=help_text, metavar=metavar, show_default=False
+    )
+    return option
+
+
+def run(
+    task: Annotated[str | None, _option("What to do, or a named task.", "TEXT|@NAME")] = None,
+    goal: Annotated[
+        str | None, _option("Scores the task against this.", "INSTANCE|ROOM|X,Y")
+    ] = None,
+    start: Annotated[str | None, _option("Where the robot starts.", "ROOM|X,Y,YAW")] = None,
+    scenario: Annotated[str, _option("Name or file; default: flat.", "NAME|FILE.yaml")] = "flat",
+    robot: Annotated[str | None, _option("Robot.", "NAME")] = None,
+    model: Annotated[
+        str | None, _option("Both models: rules[:PRESET], random or frontier.", "SPEC")
+    ] = None,
+    language_model: Annotated[str | None, _option("The language model.", "SPEC")] = None,
+    vision_model: Annotated[str | None, _option("The vision model.", "SPEC")] = None,
+    ablation: Annotated[
+        str | None, _option("Memory to leave out.", "full|no_tdm|no_scb|no_both")
+    ] = None,
+    seed: Annotated[int | None, _option("Seed of everything random.", "N")] = None,
+    max_decisions: Annotated[int | None, _option("Ends the episode.", "N")] = None,
+    renderer: Annotated[str | None, _option("Renderer of the cameras.", "vtk")] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Any value of the scenario.", metavar="DOTTED.KEY=VALUE"),
+    ] = None,
+    out: Annotated[
+        Path | None, _option("Run folder, new or empty; default: a fresh one in runs/.", "DIR")
+    ] = None,
+    meshcat: Annotated[bool, typer.Option("--meshcat", help="Show it in a browser.")] = False,
+) -> None:
+    """Runs one episode: a robot follows a sentence through a simulated home."""
+    if task is not None and not task.strip().startswith("@"):
+        checked_task(task)
+    if model is not None and (language_model is not None or vision_model is not None):
+        raise InputError(
+            "--model: sets both models; give --model alone, or --language-model and --vision-model."
+        )
+    flags = {
+        "task.text": task,
+        "task.goal": goal,
+        "task.start": start,
+        "robot.name": robot,
+        "language_model": language_model or model,
+        "vision_model": vision_model or model,
+        "ablation": ablation,
+        "random_seed": seed,
+        "budgets.decisions": max_decisions,
+        "renderer": renderer,
+        "meshcat": meshcat or None,
+    }
+    loaded = load_scenario(scenario, _overlay(flags, setting or []))
+    check_rendering()
+    run_watched(loaded, fresh_folder("runs", _run_name(scenario, loaded)) if out is None else out)
+
+
+def run_watched(scenario: Scenario, out: Path) -> None:
+    """Runs an episode with live progress and a summary at the end.
+
+    Raises:
+        typer.Exit: with 130 after an interrupt.
+    """
+    progress = Progress()
+    progress.introduce(
+        language=make_backend(scenario.language_model, place="language_model"),
+        vision=make_backend(scenario.vision_model, place="vision_model"),
+        task=choose_task(scenario),
+    )
+    try:
+        with progress:
+            result = run_episode(scenario, out=out, on_event=progress.record)
+    except KeyboardInterrupt:
+        raise typer.Exit(INTERRUPTED) from None
+    print_summary(result, out, progress.console)
+    if result.cause == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+
+
+def _overlay(flags: dict[str, str | int | bool | None], settings: list[str]) -> str:
+    # JSON is YAML, with text safely in quotes.
+    sugar = [
+        f"{key}={json.dumps(value, ensure_ascii=False)}"
+        for key, value in flags.items()
+        if value is not None
+    ]
+    return overlay_from_settings([*sugar, *settings])
+
+
+def _run_name(scenario: str, loaded: Scenario) -> str:
+    return f"{Path(scenario).stem}-{choose_task(loaded).name or 'own-task'}"

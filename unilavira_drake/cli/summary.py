@@ -1,0 +1,66 @@
+"""The end of a run: cause, figures, the run folder and what to try next."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from unilavira_drake.messages.metrics import CAUSES
+from unilavira_drake.recording.result import EpisodeResult
+
+_VERDICTS = {True: "success", False: "no success", None: "not scored"}
+
+
+def print_summary(result: EpisodeResult, out: Path, console: Console) -> None:
+    """Prints how an episode ended, its figures, its folder and three commands to try next."""
+    style = {True: "bold green", False: "bold red", None: "bold"}[result.success]
+    console.print(f"\n{_VERDICTS[result.success]}: {result.cause}", style=style, markup=False)
+    console.print(CAUSES.get(result.cause, ""), markup=False)
+    table = Table(show_header=False)
+    for name, value in _figures(result):
+        table.add_row(name, value)
+    console.print(table)
+    console.print(f"run folder: {out}", markup=False, soft_wrap=True)
+    console.print("next, try:", markup=False)
+    for command in next_commands(result, out):
+        console.print(f"  {command}", markup=False, soft_wrap=True)
+
+
+def next_commands(result: EpisodeResult, out: Path) -> tuple[str, str, str]:
+    """Returns three commands that a person would try after this episode."""
+    again = f"unilavira run --scenario {shlex.quote(str(out / 'scenario.yaml'))}"
+    other = "no_tdm" if result.ablation == "full" else "full"
+    return (
+        'unilavira run --start bedroom --task "Go to the kitchen and stop at the yellow table."',
+        f"{again} --ablation {other}",
+        "unilavira scenarios",
+    )
+
+
+def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
+    metrics, counts = result.metrics, result.counts
+    rows = [
+        ("navigation error", _metres(metrics.navigation_error_m)),
+        ("path length", _metres(metrics.path_length_m)),
+        ("shortest path", _metres(metrics.shortest_path_m)),
+        ("SPL", "-" if metrics.spl is None else f"{metrics.spl:.2f}"),
+        ("collisions", str(metrics.collisions)),
+        ("decisions", str(counts.decisions)),
+        (
+            "model calls",
+            f"{counts.language_calls} language, {counts.vision_calls} vision, "
+            f"{counts.reasks} re-asked",
+        ),
+        ("backtracks", str(counts.backtracks)),
+        ("simulated time", f"{result.time.simulated_s:.1f} s"),
+    ]
+    if metrics.answer is not None:
+        rows.append(("answer", metrics.answer))
+    return rows
+
+
+def _metres(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f} m"

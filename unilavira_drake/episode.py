@@ -1,0 +1,151 @@
+"""One episode: build the Diagram, simulate it until it ends, score it, keep what happened."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydrake.systems.analysis import Simulator, SimulatorStatus
+from pydrake.systems.framework import Context, Diagram, System
+
+from unilavira_drake.diagram import make_navigation_diagram
+from unilavira_drake.episode_result import episode_result
+from unilavira_drake.evaluation.scoring import GoalField, make_goal_field, score, shortest_path
+from unilavira_drake.messages import Frame
+from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.recording.map_picture import map_picture
+from unilavira_drake.recording.message_log import Listener, MessageLog
+from unilavira_drake.recording.result import EpisodeResult
+from unilavira_drake.recording.run_folder import RunFolder
+from unilavira_drake.recording.tally import Tally
+from unilavira_drake.recording.trace import EpisodeTrace
+from unilavira_drake.scenario import Scenario
+from unilavira_drake.scenario_loading import dump_scenario
+from unilavira_drake.task_choice import choose_task
+from unilavira_drake.worlds.load import load_world
+from unilavira_drake.worlds.start import parse_start
+
+SAMPLE_PERIOD = 0.5
+"""Simulated seconds between two points of the driven way; an interrupt waits no longer."""
+
+
+def run_episode(
+    scenario: Scenario,
+    *,
+    out: str | Path | None = None,
+    on_event: Listener | None = None,
+    replace: Mapping[str, System] | None = None,
+    detector: Callable[[Frame], ViewEvidence] | None = None,
+) -> EpisodeResult:
+    """Runs the scenario's task to its end and returns the result.
+
+    Args:
+        scenario: what to run.
+        out: the run folder, new or empty; None keeps nothing.
+        on_event: called with (simulated seconds, system, event, message) once per message.
+        replace: user's own Systems, see :func:`make_navigation_diagram`.
+        detector: see :func:`make_navigation_diagram`.
+
+    Raises:
+        InputError: if the scenario, the task or the folder cannot be used.
+    """
+    task = choose_task(scenario)
+    world = load_world(scenario.world.name, mirror=scenario.world.mirror)
+    radius = scenario.robot.radius
+    start = parse_start(task.start, world, radius=radius)
+    goal = make_goal_field(task.goal, world, radius=radius) if task.goal else None
+    if goal is not None:
+        shortest_path(goal, *start[:2])
+    tally, trace = Tally(), EpisodeTrace()
+    listeners: list[Listener] = [tally.record, trace.record]
+    if on_event is not None:
+        listeners.append(on_event)
+
+    def run() -> tuple[_Run, EpisodeResult]:
+        episode = _Run(scenario, goal, listeners, replace, detector, trace)
+        episode.simulate()
+        verdict = score(goal, episode.metrics, start[:2], episode.output("observer", "panorama"))
+        return episode, episode_result(scenario, task, episode.metrics, verdict, tally)
+
+    if out is None:
+        return run()[1]
+    with RunFolder(out) as folder:
+        listeners.append(folder.record)
+        folder.write("scenario.yaml", dump_scenario(scenario))
+        episode, result = run()
+        folder.write("result.json", result.to_json())
+        folder.write("timings.json", json.dumps(episode.timings, indent=2) + "\n")
+        folder.write("map.png", episode.picture(world, goal, task.spec.text))
+    return result
+
+
+class _Run:
+    """The simulation of one episode, and what is read from it afterwards."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        goal: GoalField | None,
+        listeners: list[Listener],
+        replace: Mapping[str, System] | None,
+        detector: Callable[[Frame], ViewEvidence] | None,
+        trace: EpisodeTrace,
+    ) -> None:
+        started = time.perf_counter()
+        self._trace = trace
+        self._diagram: Diagram = make_navigation_diagram(
+            scenario,
+            replace=replace,
+            detector=detector,
+            goal_distance=None if goal is None else goal.distance,
+            on_message=MessageLog(*listeners),
+        )
+        self._simulator = Simulator(self._diagram)
+        self._interrupted = False
+        self.timings = {"build_wall_s": round(time.perf_counter() - started, 3)}
+
+    def simulate(self) -> None:
+        """Advances until the monitor ends the episode, or a person does."""
+        wall, cpu = time.perf_counter(), time.process_time()
+        ended = SimulatorStatus.ReturnReason.kReachedTerminationCondition
+        try:
+            self._simulator.Initialize()
+            self._sample()
+            while self._simulator.AdvanceTo(self._time() + SAMPLE_PERIOD).reason() != ended:
+                self._sample()
+        except KeyboardInterrupt:
+            self._interrupted = True
+        self._sample()
+        self.timings["episode_wall_s"] = round(time.perf_counter() - wall, 3)
+        self.timings["episode_cpu_s"] = round(time.process_time() - cpu, 3)
+
+    def output(self, part: str, port: str) -> Any:
+        """Returns what stands on an output port of a named part of the Diagram."""
+        system = self._diagram.GetSubsystemByName(part)
+        return system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(self._context()))
+
+    @property
+    def metrics(self) -> Any:
+        """The monitor's metrics; the cause is ``interrupted`` when a person ended the run."""
+        metrics = self.output("episode_monitor", "metrics")
+        return metrics.interrupted() if self._interrupted and not metrics.ended else metrics
+
+    def picture(self, world: Any, goal: GoalField | None, title: str) -> bytes:
+        """Returns the map of the episode as PNG."""
+        occupancy = self.output("navigation", "map")
+        goals = () if goal is None else goal.places
+        return map_picture(world, self._trace, occupancy, goals=goals, title=title)
+
+    def _sample(self) -> None:
+        self._trace.record(
+            self._time(), "episode_monitor", "metrics", self.output("episode_monitor", "metrics")
+        )
+
+    def _time(self) -> float:
+        return float(self._context().get_time())
+
+    def _context(self) -> Context:
+        return self._simulator.get_context()

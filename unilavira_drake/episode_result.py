@@ -1,0 +1,67 @@
+"""Puts the result of an episode together."""
+
+from __future__ import annotations
+
+from unilavira_drake.evaluation.scoring import Score
+from unilavira_drake.messages.metrics import EpisodeMetrics
+from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.recording.result import (
+    EpisodeResult,
+    MetricsResult,
+    ModelResult,
+    TaskResult,
+    TimeResult,
+    installed_versions,
+)
+from unilavira_drake.recording.tally import Tally
+from unilavira_drake.scenario import Scenario
+from unilavira_drake.task_choice import EpisodeTask
+
+
+def episode_result(
+    scenario: Scenario,
+    task: EpisodeTask,
+    metrics: EpisodeMetrics,
+    verdict: Score,
+    tally: Tally,
+) -> EpisodeResult:
+    """Returns what ``result.json`` holds."""
+    return EpisodeResult(
+        scored=verdict.success is not None,
+        success=verdict.success,
+        cause=metrics.cause,
+        task=TaskResult(task.spec.family, task.spec.text, task.name, task.goal),
+        scenario=scenario.name,
+        robot=scenario.robot.name,
+        ablation=scenario.ablation,
+        seed=scenario.random_seed,
+        model=_model(scenario),
+        metrics=MetricsResult(
+            navigation_error_m=verdict.navigation_error_m,
+            path_length_m=round(verdict.path_length_m, 4),
+            shortest_path_m=verdict.shortest_path_m,
+            spl=verdict.spl,
+            oracle_success=verdict.oracle_success,
+            success_3m=verdict.success_3m,
+            collisions=metrics.collisions,
+            max_contact_force_n=round(metrics.max_contact_force, 3),
+            answer=tally.answer or None,
+        ),
+        counts=tally.counts(metrics.decisions),
+        usage=tally.usage,
+        time=TimeResult(round(metrics.time, 3)),
+        versions=installed_versions(),
+    )
+
+
+def _model(scenario: Scenario) -> ModelResult:
+    language = make_backend(scenario.language_model, place="language_model")
+    vision = make_backend(scenario.vision_model, place="vision_model")
+    # The weaker claim stands for the pair: one level on ground truth taints the whole result.
+    perceptions = {language.perception, vision.perception}
+    return ModelResult(
+        language=language.name,
+        vision=vision.name,
+        perception="ground_truth" if "ground_truth" in perceptions else "images",
+        reasoning=language.reasoning,
+    )

@@ -1,0 +1,178 @@
+"""Scoring: success, navigation error and SPL, from the truth and never from the agent.
+
+Success: the agent ended by its own verified stop, at most ``SUCCESS_DISTANCE`` of geodesic from
+the free floor at the goal, in the goal's room, and with the goal instance in its last panorama.
+SPL = success * l / max(l, p) with the shortest way l and the way gone p (Anderson et al., "On
+Evaluation of Embodied Navigation Agents", 2018).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from unilavira_drake.errors import TaskError
+from unilavira_drake.evaluation.free_space import GeodesicField, free_space, geodesic_field
+from unilavira_drake.evaluation.goal import GoalTarget, footprint, resolve_goal
+from unilavira_drake.messages import Message, Panorama
+from unilavira_drake.messages.metrics import EpisodeMetrics
+from unilavira_drake.worlds.world import World
+
+SUCCESS_DISTANCE = 1.5
+"""Metres of geodesic between the robot and the free floor at the goal."""
+LOOSE_DISTANCE = 3.0
+"""The radius common in the literature, printed beside, metres."""
+SEEN_PIXELS = 60
+"""A goal instance counts as seen when one frame shows at least this many pixels of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class GoalField(Message):
+    """The goal of an episode: its alternatives, and the geodesic distance to each of them."""
+
+    world: World = World()
+    targets: tuple[GoalTarget, ...] = ()
+    fields: tuple[GeodesicField, ...] = ()
+
+    @property
+    def places(self) -> tuple[tuple[float, float], ...]:
+        """Middle of each alternative, metres in the world; for pictures."""
+        return tuple(target.place(self.world) for target in self.targets)
+
+    def distances(self, x: float, y: float) -> tuple[float, ...]:
+        """Returns the geodesic distance to each alternative, metres."""
+        return tuple(field.distance(x, y) for field in self.fields)
+
+    def distance(self, x: float, y: float) -> float:
+        """Returns the geodesic distance to the nearest alternative, metres; inf if none."""
+        return min(self.distances(x, y))
+
+
+@dataclass(frozen=True)
+class Score(Message):
+    """The verdict on an episode; None where it is not scored or not defined."""
+
+    success: bool | None = None
+    success_3m: bool | None = None
+    """Stopped within 3 m, whatever the room and the view."""
+    navigation_error_m: float | None = None
+    path_length_m: float = 0.0
+    shortest_path_m: float | None = None
+    spl: float | None = None
+    oracle_success: bool | None = None
+    """Whether the robot ever was within the success distance."""
+    same_room: bool | None = None
+    goal_seen: bool | None = None
+    notes: tuple[str, ...] = ()
+    """Why a figure is not defined."""
+
+
+def make_goal_field(
+    goal: str, world: World, *, radius: float, resolution: float = 0.05
+) -> GoalField:
+    """Returns what scores a goal text in a world for a robot of this radius.
+
+    Raises:
+        TaskError: if the text does not resolve, or no free floor is near a target.
+    """
+    targets = resolve_goal(goal, world)
+    space = free_space(world, radius=radius, resolution=resolution)
+    fields = tuple(geodesic_field(space, footprint(target, world, space)) for target in targets)
+    return GoalField(world, targets, fields)
+
+
+def shortest_path(goal: GoalField, x: float, y: float) -> float:
+    """Returns the geodesic distance from a start, metres.
+
+    Raises:
+        TaskError: if the start is inside an obstacle or cut off from every alternative.
+    """
+    distance = goal.distance(x, y)
+    space = goal.fields[0].space
+    row = math.floor((y - space.origin[1]) / space.resolution)
+    column = math.floor((x - space.origin[0]) / space.resolution)
+    # A start up to one cell beside free floor is free: the border of the grid is that coarse.
+    near = space.free[max(row - 1, 0) : max(row + 2, 0), max(column - 1, 0) : max(column + 2, 0)]
+    if not near.any():
+        raise TaskError(
+            f"start: {x:.2f},{y:.2f} is inside an obstacle, too near to one, or shut in; "
+            "choose a start on free floor."
+        )
+    return distance
+
+
+def score(
+    goal: GoalField | None,
+    metrics: EpisodeMetrics,
+    start: tuple[float, float],
+    panorama: Panorama,
+) -> Score:
+    """Returns the verdict on an episode.
+
+    Args:
+        goal: None when the episode is not scored.
+        metrics: at the end of the episode.
+        start: position of the base at the start, metres.
+        panorama: the last one.
+
+    Raises:
+        TaskError: if the start cannot be one.
+    """
+    if goal is None:
+        return Score(path_length_m=metrics.path_length)
+    shortest = shortest_path(goal, *start)
+    x, y = metrics.position
+    distances = goal.distances(x, y)
+    error = min(distances)
+    stopped = metrics.cause == "stopped"
+    nearest = goal.targets[distances.index(error)]
+    success = stopped and any(
+        distance <= SUCCESS_DISTANCE
+        and in_room(target, goal.world, x, y)
+        and seen(target, panorama) is not False
+        for target, distance in zip(goal.targets, distances, strict=True)
+    )
+    spl, notes = _spl(success, shortest, metrics.path_length)
+    if math.isinf(error):
+        notes += ("navigation_error_m: the robot ended where it has no way to the goal",)
+    closest = error if metrics.min_goal_distance is None else metrics.min_goal_distance
+    return Score(
+        success=success,
+        success_3m=stopped and error <= LOOSE_DISTANCE,
+        navigation_error_m=error if math.isfinite(error) else None,
+        path_length_m=metrics.path_length,
+        shortest_path_m=shortest if math.isfinite(shortest) else None,
+        spl=spl,
+        oracle_success=min(closest, error) <= SUCCESS_DISTANCE,
+        same_room=in_room(nearest, goal.world, x, y),
+        goal_seen=seen(nearest, panorama),
+        notes=notes,
+    )
+
+
+def in_room(target: GoalTarget, world: World, x: float, y: float) -> bool:
+    """Whether a floor point lies in (one of) the target's rooms."""
+    room = world.room_at(x, y)
+    return room is not None and room.name in target.rooms
+
+
+def seen(target: GoalTarget, panorama: Panorama) -> bool | None:
+    """Whether a frame shows the target; None for a room or a point, which need not be seen."""
+    if target.kind != "instance":
+        return None
+    if target.label is None:
+        return False
+    return any(
+        int(np.count_nonzero(frame.label == target.label)) >= SEEN_PIXELS
+        for frame in panorama.frames
+    )
+
+
+def _spl(success: bool, shortest: float, gone: float) -> tuple[float | None, tuple[str, ...]]:
+    if shortest == 0.0:
+        return None, ("spl: the robot started at the goal",)
+    if math.isinf(shortest):
+        return None, ("spl: there is no way from the start to the goal",)
+    return (shortest / max(shortest, gone) if success else 0.0), ()

@@ -1,0 +1,63 @@
+"""The final check and the answer to a question, from the present evidence only."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from unilavira_drake.mllm.rules.clauses import Clause, describe
+from unilavira_drake.mllm.rules.lexicon import tokenize
+from unilavira_drake.mllm.rules.situation import Situation
+
+UNKNOWN = "unknown"
+
+
+def double_check(situation: Situation) -> dict[str, Any]:
+    """Returns the verdict: confirmed only if every step is done and the last target is here."""
+    open_steps = situation.pending
+    if open_steps:
+        reason = f"not done: {describe(open_steps[0].clause)}"
+        return {"reasoning": reason, "confirmed": False, "reason": reason}
+    last = situation.steps[-1].clause if situation.steps else None
+    if last is None:
+        return _confirmed("no step could be read from the task", situation.scene.room_id)
+    if last.category and last.kind in ("go", "stop"):
+        sight = situation.reached(last)
+        if sight is None:
+            reason = f"not beside the {last.thing}"
+            return {"reasoning": reason, "confirmed": False, "reason": reason}
+        return _confirmed(f"{sight.name} at {sight.near:.1f} m", sight.id)
+    if last.kind in ("enter", "through", "along") and situation.scene.room != last.room:
+        reason = f"the floor underfoot is that of the {situation.scene.room or 'unknown room'}"
+        return {"reasoning": reason, "confirmed": False, "reason": f"not in the {last.room}"}
+    return _confirmed(f"in the {situation.scene.room}", situation.scene.room_id)
+
+
+def answer(situation: Situation) -> dict[str, Any]:
+    """Returns the answer to the task's question: a colour, a room, a count, yes, or ``unknown``."""
+    question = situation.variables.task.lower()
+    asked = [s.clause for s in situation.steps if s.clause.category]
+    thing = asked[-1] if asked else _asked_thing(question)
+    seen = situation.scene.matching(thing) if thing else []
+    if not seen:
+        return {"reasoning": "the thing asked about is not in view", "answer": UNKNOWN}
+    shown = f"{seen[0].name} at {seen[0].near:.1f} m ({seen[0].id})"
+    if re.search(r"\bcolou?r\b", question):
+        return {"reasoning": shown, "answer": seen[0].color or UNKNOWN}
+    if re.search(r"\bhow many\b", question):
+        number = max(sum(s.direction == d for s in seen) for d in {s.direction for s in seen})
+        return {"reasoning": f"most in one view; {shown}", "answer": str(number)}
+    if re.search(r"\b(where|room)\b", question):
+        return {"reasoning": shown, "answer": situation.scene.room or UNKNOWN}
+    if re.match(r"(is|are|do|does|can)\b", question):
+        return {"reasoning": shown, "answer": "yes"}
+    return {"reasoning": shown, "answer": UNKNOWN}
+
+
+def _asked_thing(question: str) -> Clause | None:
+    things = [t.value for t in tokenize(question) if t.kind == "thing" and t.value != "door"]
+    return Clause("go", things[0]) if things else None
+
+
+def _confirmed(shown: str, sight_id: str) -> dict[str, Any]:
+    return {"reasoning": f"{shown} ({sight_id})", "confirmed": True, "reason": ""}

@@ -1,0 +1,67 @@
+"""The model ``rules``: one request in, one JSON reply out."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from unilavira_drake.errors import MllmError
+from unilavira_drake.mllm.request import Completion, MllmRequest, VisionVariables
+from unilavira_drake.mllm.rules.check import answer, double_check
+from unilavira_drake.mllm.rules.decide import decide
+from unilavira_drake.mllm.rules.lexicon import unused_words
+from unilavira_drake.mllm.rules.plan import clauses_of, items_of
+from unilavira_drake.mllm.rules.situation import Situation, assess
+from unilavira_drake.mllm.rules.vision import ground
+
+
+class RulesModel:
+    """A stateless, deterministic function of one request; needs no key and no network.
+
+    It reads the prompt's variables and the labelled detections of the views.  It sees no poses,
+    no identities across views, no map and nothing behind a closed line of sight, and remembers
+    only what the TODO list and the history of the request carry.
+    """
+
+    name = "rules"
+    perception = "ground_truth"
+    reasoning = "rules"
+    description = "rules on the simulator's labels, not a multimodal LLM"
+
+    def complete(self, request: MllmRequest) -> Completion:
+        """Answers a request.
+
+        Raises:
+            MllmError: if the request carries no evidence or its call is unknown.
+        """
+        if request.evidence is None:
+            raise MllmError("rules: the request carries no labelled detections to reason on.")
+        if isinstance(request.variables, VisionVariables):
+            reply = ground(request.variables, request.evidence)
+        else:
+            reply = _language_reply(request)
+        return Completion(text=json.dumps(reply, ensure_ascii=False))
+
+
+def _language_reply(request: MllmRequest) -> dict[str, Any]:
+    situation = assess(request)
+    if request.call == "plan_todo":
+        return _plan(situation)
+    if request.call in ("decide", "recover"):
+        return decide(situation)
+    if request.call == "double_check":
+        return double_check(situation)
+    if request.call == "answer":
+        return answer(situation)
+    raise MllmError(f"rules: unknown call {request.call!r}.")
+
+
+def _plan(situation: Situation) -> dict[str, Any]:
+    variables = situation.variables
+    clauses = clauses_of(variables.task, variables.family, situation.scene.room)
+    unused = unused_words(variables.task)
+    words = f"Words not used: {', '.join(unused)}." if unused else "Every word was used."
+    return {
+        "reasoning": f"{len(clauses)} clauses found in the text. {words}",
+        "todo": items_of(clauses),
+    }

@@ -1,0 +1,211 @@
+"""What is around the robot now, in its own frame, from the detections of the four views."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from unilavira_drake.messages import VIEW_YAW
+from unilavira_drake.mllm.evidence import Detection, ViewEvidence
+from unilavira_drake.mllm.request import ViewNote
+from unilavira_drake.mllm.rules.clauses import Clause
+from unilavira_drake.mllm.rules.floor_camera import FloorCamera
+from unilavira_drake.mllm.rules.vocabulary import class_match, color_name, room_kind, thing_class
+
+
+@dataclass(frozen=True)
+class Sight:
+    """One detection, placed relative to the robot: x ahead, y to the left, metres."""
+
+    id: str
+    category: str
+    color: str
+    room: str
+    direction: str
+    bearing: float
+    """Degrees to the left of ``front``."""
+    distance: float
+    near: float
+    """Distance to its nearest visible part on the floor, metres."""
+    pixels: int
+    detection: Detection
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """(x ahead, y to the left), metres."""
+        angle = math.radians(self.bearing)
+        return self.distance * math.cos(angle), self.distance * math.sin(angle)
+
+    @property
+    def name(self) -> str:
+        """The thing in words."""
+        return f"{self.color} {self.category}".strip()
+
+
+@dataclass(frozen=True)
+class Exit:
+    """A door, or the border to another room's floor where there is no door."""
+
+    kind: str
+    """Kind of the room behind; empty where its floor is not in view."""
+    sight: Sight
+    beyond: Sight | None = None
+    """The floor behind."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The panorama as the reasoner sees it."""
+
+    room: str
+    """Kind of the room underfoot; empty when no floor is in view."""
+    room_id: str
+    """Detection that shows it."""
+    things: tuple[Sight, ...]
+    floors: tuple[Sight, ...]
+    exits: tuple[Exit, ...]
+    free: dict[str, float]
+    """Measured free distance along each view's axis, metres."""
+
+    def matching(self, clause: Clause) -> list[Sight]:
+        """Returns the things a clause means, best class match first, then nearest."""
+        found = [
+            (-class_match(clause.category, s.category), s.near, i)
+            for i, s in enumerate(self.things)
+            if class_match(clause.category, s.category)
+            and (not clause.color or s.color == clause.color)
+        ]
+        best = min((rank for rank, _, _ in found), default=0)
+        return [self.things[i] for rank, _, i in sorted(found) if rank == best]
+
+
+def angle_between(a: float, b: float) -> float:
+    """Returns the unsigned angle between two bearings, degrees."""
+    return abs(math.remainder(a - b, 360.0))
+
+
+def look(views: Sequence[ViewEvidence], notes: Sequence[ViewNote]) -> Scene:
+    """Returns the scene of one panorama."""
+    camera = FloorCamera.fit(views)
+    sights = [_sight(d, view, camera) for view in views for d in view.detections]
+    floors = tuple(s for s in sights if s.category == "floor")
+    doors = [s for s in sights if s.category == "door"]
+    room, room_id = _underfoot(floors, views)
+    things = tuple(s for s in sights if s.category not in ("floor", "door", "wall", "ceiling"))
+    return Scene(
+        room=room,
+        room_id=room_id or (sights[0].id if sights else ""),
+        things=things,
+        floors=floors,
+        exits=_exits(doors, floors, room),
+        free={note.direction: note.free_distance for note in notes},
+    )
+
+
+def _sight(detection: Detection, view: ViewEvidence, camera: FloorCamera) -> Sight:
+    is_floor = detection.category == "floor"
+    u_min, _, u_max, v_max = detection.box
+    u = detection.point[0] if is_floor else (u_min + u_max) / 2
+    bearing = math.degrees(VIEW_YAW[view.direction] + view.bearing(u))
+    distance = detection.point_distance if is_floor else detection.distance
+    category = thing_class(detection.category)
+    foot = camera.reach((u_min + u_max) / 2, min(v_max, view.height - 1))
+    return Sight(
+        id=detection.id,
+        category=category,
+        color=color_name(detection.color),
+        room=room_kind(detection.room) if detection.room else "",
+        direction=view.direction,
+        bearing=math.remainder(bearing, 360.0),
+        distance=distance,
+        near=min(distance, foot),
+        pixels=detection.pixels,
+        detection=detection,
+    )
+
+
+def _underfoot(floors: Sequence[Sight], views: Sequence[ViewEvidence]) -> tuple[str, str]:
+    """Returns the kind of room whose floor fills most of the nearest image rows, and its id."""
+    bottom = {view.direction: view.height - 3 for view in views}
+    weights: dict[str, float] = {}
+    largest: dict[str, Sight] = {}
+    for floor in floors:
+        near = floor.detection.box[3] >= bottom[floor.direction]
+        weight = floor.pixels * (1.0 if near else 0.1)
+        weights[floor.room] = weights.get(floor.room, 0.0) + weight
+        if floor.room not in largest or floor.pixels > largest[floor.room].pixels:
+            largest[floor.room] = floor
+    if not weights:
+        return "", ""
+    room = max(weights, key=lambda kind: weights[kind])
+    return room, largest[room].id
+
+
+def _exits(doors: Sequence[Sight], floors: Sequence[Sight], room: str) -> tuple[Exit, ...]:
+    exits = [_door_exit(door, floors, room) for door in doors if not _behind(door, doors)]
+    exits = _distinct(exits)
+    for floor in sorted(floors, key=lambda f: f.distance):
+        framed = any(_inside(floor, door) for door in doors)
+        if floor.room == room or framed or _known(floor, exits):
+            continue
+        exits.append(Exit(floor.room, floor, floor))
+    return tuple(exits)
+
+
+def _inside(sight: Sight, door: Sight, margin: float = 12.0) -> bool:
+    u_min, _, u_max, _ = door.detection.box
+    u = sight.detection.point[0]
+    return sight.direction == door.direction and u_min - margin <= u <= u_max + margin
+
+
+def _behind(door: Sight, doors: Sequence[Sight]) -> bool:
+    """Whether a door is seen through the opening of another one."""
+    u_min, _, u_max, _ = door.detection.box
+    return any(
+        other.direction == door.direction
+        and other.detection.box[0] <= u_min
+        and u_max <= other.detection.box[2]
+        and other.distance < door.distance - 0.5
+        for other in doors
+        if other is not door
+    )
+
+
+def _door_exit(door: Sight, floors: Sequence[Sight], room: str) -> Exit:
+    beyond = [
+        f
+        for f in floors
+        if f.room != room and _inside(f, door) and f.distance > door.distance - 0.4
+    ]
+    if not beyond:
+        return Exit("", door)
+    nearest = min(beyond, key=lambda f: f.near)
+    return Exit(nearest.room, door, nearest)
+
+
+def _distinct(exits: list[Exit]) -> list[Exit]:
+    """Keeps one exit where the same door is seen at the edges of two views."""
+    kept: list[Exit] = []
+    for candidate in sorted(exits, key=lambda e: (not e.kind, -e.sight.pixels)):
+        twin = next(
+            (
+                k
+                for k in kept
+                if math.dist(k.sight.position, candidate.sight.position) < 0.9
+                and k.sight.direction != candidate.sight.direction
+            ),
+            None,
+        )
+        if twin is None:
+            kept.append(candidate)
+        elif twin.sight.pixels < candidate.sight.pixels and not twin.kind:
+            kept[kept.index(twin)] = dataclasses.replace(twin, sight=candidate.sight)
+    return kept
+
+
+def _known(floor: Sight, exits: Sequence[Exit]) -> bool:
+    return any(
+        e.kind == floor.room and angle_between(e.sight.bearing, floor.bearing) < 50.0 for e in exits
+    )

@@ -1,0 +1,109 @@
+"""One plan: from a map, a pose and a target to a path on free floor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.messages import Message, OccupancyMap
+from unilavira_drake.planning import fast_marching, navigation_grid, polyline, snapping
+from unilavira_drake.planning.navigation_grid import NavigationGrid, make_navigation_grid
+from unilavira_drake.planning.snapping import UNREACHABLE, snap
+
+
+@dataclass(frozen=True)
+class PlanningParameters(Message):
+    """The robot's size and the bound on snapping, metres."""
+
+    radius: float = 0.36
+    """Kept free around the base's centre."""
+    turning_radius: float = 0.50
+    """Swept when the base turns in place; goals keep it free where they can."""
+    snap_distance: float = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Plan(Message):
+    """A path, or the reason why there is none."""
+
+    p_WP: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    """(k, 2) float64, metres in the world, from the robot to the snapped goal."""
+    length: float = 0.0
+    """Metres."""
+    reason: str = ""
+
+    @property
+    def goal(self) -> tuple[float, float]:
+        """(x, y) of the snapped goal; only of a plan with a path."""
+        return (float(self.p_WP[-1, 0]), float(self.p_WP[-1, 1]))
+
+
+def make_plan(
+    occupancy: OccupancyMap,
+    *,
+    position: tuple[float, float],
+    target: tuple[float, float],
+    viewpoint: tuple[float, float],
+    goal: tuple[float, float] | None = None,
+    parameters: PlanningParameters,
+) -> Plan:
+    """Returns a plan to the floor nearest to a target.
+
+    The field is marched from the goal and stops at the robot, so a near goal costs little in a
+    large map.
+
+    Args:
+        occupancy: the map.
+        position: (x, y) of the robot, metres.
+        target: (x, y) of the selected point, metres.
+        viewpoint: (x, y) from which the target was seen, metres.
+        goal: (x, y) of the goal snapped before; kept while the robot can stand there.
+        parameters: the robot's size and the bound on snapping.
+    """
+    grid = make_navigation_grid(
+        occupancy,
+        position=position,
+        targets=(target,) if goal is None else (target, goal),
+        radius=parameters.radius,
+        turning_radius=parameters.turning_radius,
+    )
+    here = grid.cell(*position)
+    reachable = grid.reachable(here)
+    cell = None if goal is None else _kept(grid, reachable, goal)
+    if cell is None:
+        snapped = snap(
+            grid,
+            reachable,
+            target=target,
+            position=position,
+            viewpoint=viewpoint,
+            max_distance=parameters.snap_distance,
+            turning_radius=parameters.turning_radius,
+        )
+        if snapped.cell is None:
+            return Plan(reason=snapped.reason)
+        cell = snapped.cell
+    times = fast_marching.distance_field(
+        grid.blocked, np.array([cell]), slowness=grid.slowness, stop=here
+    )
+    cells = polyline.extract_path(times, grid.blocked, grid.slowness, grid.point(*position))
+    if not len(cells):
+        return Plan(reason=UNREACHABLE)
+    p_WP = cells * grid.resolution + np.array(grid.origin)
+    return Plan(p_WP=p_WP, length=polyline.length(p_WP))
+
+
+def _kept(
+    grid: NavigationGrid, reachable: NDArray[np.bool_], goal: tuple[float, float]
+) -> tuple[int, int] | None:
+    cell = grid.cell(*goal)
+    stands = not grid.blocked[cell] and bool(reachable[cell]) and grid.log_odds[cell] < 0
+    return cell if stands else None
+
+
+def warm_up() -> None:
+    """Compiles every kernel of planning, or loads it from numba's cache."""
+    for module in (fast_marching, navigation_grid, polyline, snapping):
+        module.warm_up()

@@ -1,0 +1,217 @@
+"""The planner: snaps goals, plans and replans, and says how the robot's way ends."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from typing import Any
+
+from pydrake.systems.framework import Context
+
+from unilavira_drake.messages import Goal, Message, NavigationStatus, OccupancyMap, Path
+from unilavira_drake.planning.navigation_grid import path_is_blocked
+from unilavira_drake.planning.plan import Plan, PlanningParameters, make_plan, warm_up
+from unilavira_drake.planning.polyline import remaining_length
+from unilavira_drake.ports import Level, message_input, pose_input
+
+PROGRESS = 0.05
+"""The way that remains must shrink by this much to count as progress, metres."""
+
+BUDGET_BASE = 3.0
+"""Travel that is always granted beyond the planned length times the travel factor, metres."""
+
+Point = tuple[float, float]
+
+
+@dc.dataclass(frozen=True)
+class PlannerState(Message):
+    """Status and path of one goal, and what it takes to watch its progress."""
+
+    status: NavigationStatus = NavigationStatus()
+    path: Path = Path()
+    heading: float | None = None
+    target: Point = (0.0, 0.0)
+    """The selected point before snapping, metres."""
+    viewpoint: Point = (0.0, 0.0)
+    """Where the robot was when the goal was given, metres."""
+    map_version: int = 0
+    """Version of the map of the latest plan."""
+    checked_version: int = 0
+    """Version of the map against which the path was last checked."""
+    plan_time: float = 0.0
+    progress_time: float = 0.0
+    least_remaining: float = math.inf
+    position: Point = (0.0, 0.0)
+    """Where travel was last added up, metres."""
+    travelled: float = 0.0
+    budget: float = 0.0
+
+
+class FastMarchingPlanner(Level):
+    """Plans on free floor to each goal and reports ``arrived`` or ``failed`` with the reason.
+
+    Goal n is taken up once the map holds panorama n.  While the robot moves, the way is planned
+    anew when a new map blocks it, or when the map changed and the plan is ``replan_period`` old.
+    A terminal status and the empty path are views of one state.  Reasons of failure: the goal's
+    own, ``unreachable``, ``no free space within ... m``, ``stuck``, ``travel budget``.
+
+    .. pydrake_system::
+
+        name: FastMarchingPlanner
+        input_ports:
+        - map
+        - pose_estimate
+        - goal
+        output_ports:
+        - path
+        - navigation_status
+
+    Args:
+        radius: radius kept free around the base's centre, metres.
+        turning_radius: radius swept when the base turns in place, metres.
+        snap_distance: a goal moves at most this far to free floor, metres.
+        tolerance: arrived within this distance of the snapped goal, metres.
+        stuck_time: stuck after this long without progress, seconds.
+        travel_factor: fails after this many times the planned length plus 3 m.
+        replan_period: seconds between two plans while nothing blocks the way.
+        period: seconds between two polls.
+    """
+
+    def __init__(
+        self,
+        *,
+        radius: float = 0.36,
+        turning_radius: float = 0.50,
+        snap_distance: float = 1.5,
+        tolerance: float = 0.15,
+        stuck_time: float = 6.0,
+        travel_factor: float = 3.0,
+        replan_period: float = 1.0,
+        period: float = 0.1,
+    ) -> None:
+        super().__init__(PlannerState(), period=period)
+        self._parameters = PlanningParameters(radius, turning_radius, snap_distance)
+        self._tolerance = tolerance
+        self._stuck_time = stuck_time
+        self._travel_factor = travel_factor
+        self._replan_period = replan_period
+        self._map = message_input(self, "map", OccupancyMap())
+        self._pose = pose_input(self, "pose_estimate")
+        self._goal = message_input(self, "goal", Goal())
+        self.declare_output("path", lambda state: state.path, Path())
+        self.declare_output("navigation_status", lambda state: state.status, NavigationStatus())
+        warm_up()
+
+    def step(self, context: Context, state: Any) -> Any:
+        """Returns the state after a new goal, a new map or some way driven; see the class."""
+        time = context.get_time()
+        if not state.status.terminal:
+            return self._follow(state, self._map(context), self._position(context), time)
+        goal = self._goal(context)
+        if goal.n <= state.status.n:
+            return state
+        occupancy = self._map(context)
+        if occupancy.n < goal.n:
+            return state
+        if goal.kind == "stay":
+            return _done(goal.n, "arrived", "", goal.heading)
+        if goal.kind != "go" or goal.p_WG is None:
+            return _done(goal.n, "failed", goal.reason, None)
+        return self._begin(goal, occupancy, self._position(context), time)
+
+    def _position(self, context: Context) -> Point:
+        x, y, _ = self._pose(context).translation()
+        return (float(x), float(y))
+
+    def _begin(
+        self, goal: Goal, occupancy: OccupancyMap, position: Point, time: float
+    ) -> PlannerState:
+        assert goal.p_WG is not None
+        fresh = PlannerState(
+            status=NavigationStatus(goal.n, "moving"),
+            heading=goal.heading,
+            target=goal.p_WG[:2],
+            viewpoint=position,
+            progress_time=time,
+            position=position,
+        )
+        plan = make_plan(
+            occupancy,
+            position=position,
+            target=fresh.target,
+            viewpoint=position,
+            parameters=self._parameters,
+        )
+        return self._planned(fresh, plan, occupancy, time)
+
+    def _planned(
+        self, state: PlannerState, plan: Plan, occupancy: OccupancyMap, time: float
+    ) -> PlannerState:
+        n = state.status.n
+        if plan.reason:
+            return _done(n, "failed", plan.reason, None)
+        if plan.length <= self._tolerance:
+            return _done(n, "arrived", "", state.heading)
+        version = state.path.version + 1 if state.path.n == n else 0
+        return dc.replace(
+            state,
+            path=Path(n, version, plan.p_WP),
+            map_version=occupancy.version,
+            checked_version=occupancy.version,
+            plan_time=time,
+            # Not the time of progress: replanning alone must not hide that the robot is stuck.
+            least_remaining=plan.length,
+            budget=max(state.budget, self._travel_factor * plan.length + BUDGET_BASE),
+        )
+
+    def _follow(
+        self, state: PlannerState, occupancy: OccupancyMap, position: Point, time: float
+    ) -> PlannerState:
+        points = state.path.p_WP
+        goal = (float(points[-1, 0]), float(points[-1, 1]))
+        if math.dist(position, goal) <= self._tolerance:
+            return _done(state.status.n, "arrived", "", state.heading)
+        step = math.dist(position, state.position)
+        if step >= PROGRESS:
+            travelled = state.travelled + step
+            state = dc.replace(state, travelled=travelled, position=position)
+        if state.travelled > state.budget:
+            return _done(state.status.n, "failed", "travel budget", None)
+        remaining = remaining_length(points, *position)
+        if remaining <= state.least_remaining - PROGRESS:
+            state = dc.replace(state, least_remaining=remaining, progress_time=time)
+        elif time - state.progress_time > self._stuck_time:
+            return _done(state.status.n, "failed", "stuck", None)
+        return self._replanned(state, occupancy, position, goal, time)
+
+    def _replanned(
+        self,
+        state: PlannerState,
+        occupancy: OccupancyMap,
+        position: Point,
+        goal: Point,
+        time: float,
+    ) -> PlannerState:
+        due = time - state.plan_time >= self._replan_period - 1e-9
+        if occupancy.version == state.map_version or (
+            occupancy.version == state.checked_version and not due
+        ):
+            return state
+        if not due and not path_is_blocked(
+            occupancy, state.path.p_WP, position=position, radius=self._parameters.radius
+        ):
+            return dc.replace(state, checked_version=occupancy.version)
+        plan = make_plan(
+            occupancy,
+            position=position,
+            target=state.target,
+            viewpoint=state.viewpoint,
+            goal=goal,
+            parameters=self._parameters,
+        )
+        return self._planned(state, plan, occupancy, time)
+
+
+def _done(n: int, state: str, reason: str, heading: float | None) -> PlannerState:
+    """Returns the terminal state of goal n: its status and the empty path, in one message."""
+    return PlannerState(status=NavigationStatus(n, state, reason, heading), path=Path(n))

@@ -1,0 +1,142 @@
+"""The result of an episode and its file, ``result.json``."""
+
+from __future__ import annotations
+
+import json
+import platform
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from unilavira_drake.errors import InputError
+from unilavira_drake.mllm.request import Usage
+
+RESULT_SCHEMA_VERSION = 1
+
+_DISTRIBUTIONS = ("unilavira-drake", "drake", "numpy", "opencv-python-headless", "numba")
+
+
+@dataclass(frozen=True)
+class TaskResult:
+    """The task that was run; ``goal`` is what scored it, empty when nothing did."""
+
+    family: str = ""
+    text: str = ""
+    name: str = ""
+    goal: str = ""
+
+
+@dataclass(frozen=True)
+class ModelResult:
+    """The models, and what they declare about themselves."""
+
+    language: str = ""
+    vision: str = ""
+    perception: str = ""
+    """``ground_truth`` | ``images``."""
+    reasoning: str = ""
+    """``rules`` | ``model`` | ``human``."""
+
+
+@dataclass(frozen=True)
+class MetricsResult:
+    """Scores in metres and newtons; None where the episode is not scored."""
+
+    navigation_error_m: float | None = None
+    path_length_m: float = 0.0
+    shortest_path_m: float | None = None
+    spl: float | None = None
+    oracle_success: bool | None = None
+    success_3m: bool | None = None
+    """Stopped within 3 m, the radius common in the literature; beside the stricter success."""
+    collisions: int = 0
+    max_contact_force_n: float = 0.0
+    answer: str | None = None
+    answer_correct: bool | None = None
+
+
+@dataclass(frozen=True)
+class CountsResult:
+    """How often what happened."""
+
+    decisions: int = 0
+    language_calls: int = 0
+    vision_calls: int = 0
+    reasks: int = 0
+    fallbacks: int = 0
+    backtracks: int = 0
+
+
+@dataclass(frozen=True)
+class TimeResult:
+    """Simulated time; wall and CPU times stand in ``timings.json``."""
+
+    simulated_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """What an episode came to: the content of ``result.json``."""
+
+    schema_version: int = RESULT_SCHEMA_VERSION
+    scored: bool = False
+    success: bool | None = None
+    cause: str = ""
+    """Why the episode ended; one of ``unilavira_drake.episode_monitor``'s causes."""
+    task: TaskResult = TaskResult()
+    scenario: str = ""
+    robot: str = ""
+    ablation: str = "full"
+    seed: int = 0
+    model: ModelResult = ModelResult()
+    metrics: MetricsResult = MetricsResult()
+    counts: CountsResult = CountsResult()
+    usage: Usage = Usage()
+    time: TimeResult = TimeResult()
+    versions: dict[str, str] = field(default_factory=dict)
+
+    def to_json(self) -> str:
+        """Returns the text of ``result.json``."""
+        return json.dumps(asdict(self), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+_PARTS = {
+    "task": TaskResult,
+    "model": ModelResult,
+    "metrics": MetricsResult,
+    "counts": CountsResult,
+    "usage": Usage,
+    "time": TimeResult,
+}
+
+
+def result_from_json(text: str) -> EpisodeResult:
+    """Returns the result that a ``result.json`` holds.
+
+    Raises:
+        InputError: if the text is no result of this schema version.
+    """
+    try:
+        fields: dict[str, Any] = json.loads(text)
+        found = fields["schema_version"]
+        if found != RESULT_SCHEMA_VERSION:
+            raise InputError(
+                f"result.json: schema_version {found}, this program reads "
+                f"{RESULT_SCHEMA_VERSION}; use the version that wrote it."
+            )
+        for name, part in _PARTS.items():
+            fields[name] = part(**fields[name])
+        return EpisodeResult(**fields)
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"result.json: not a result of an episode: {error}.") from None
+
+
+def installed_versions() -> dict[str, str]:
+    """Returns the versions of Python and of the packages that shape an episode."""
+    versions = {"python": platform.python_version()}
+    for name in _DISTRIBUTIONS:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions

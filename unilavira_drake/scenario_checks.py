@@ -1,0 +1,153 @@
+"""Checks the values of a scenario that its types alone cannot tell to be wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from pydrake.multibody.plant import AddMultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+
+from unilavira_drake.errors import ScenarioError, TaskError, unknown_name
+from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.scenario import ABLATIONS, RENDERERS, Scenario
+from unilavira_drake.task_choice import choose_task
+from unilavira_drake.tasks import FAMILIES, checked_task
+from unilavira_drake.worlds.load import load_world
+from unilavira_drake.worlds.start import parse_start
+
+_MAX_IMAGE = 4096
+
+_Rule = tuple[str, Callable[[Any], bool]]
+
+_POSITIVE: _Rule = ("a positive number", lambda value: value > 0)
+_NOT_NEGATIVE: _Rule = ("a number that is not negative", lambda value: value >= 0)
+_IMAGE_SIDE: _Rule = (f"16 to {_MAX_IMAGE} pixels", lambda value: 16 <= value <= _MAX_IMAGE)
+
+_RULES: dict[str, _Rule] = {
+    "random_seed": _NOT_NEGATIVE,
+    "language_latency.seconds": _NOT_NEGATIVE,
+    "language_latency.sigma": _NOT_NEGATIVE,
+    "vision_latency.seconds": _NOT_NEGATIVE,
+    "vision_latency.sigma": _NOT_NEGATIVE,
+    "mapping.min_height": _NOT_NEGATIVE,
+    "planning.snap_distance": _NOT_NEGATIVE,
+    "memory.decisions": _NOT_NEGATIVE,
+    "memory.keyframes": _NOT_NEGATIVE,
+    "memory.merge_distance": _NOT_NEGATIVE,
+    "robot.image_width": _IMAGE_SIDE,
+    "robot.image_height": _IMAGE_SIDE,
+    "robot.horizontal_fov_degrees": ("between 10 and 150 degrees", lambda v: 10 <= v <= 150),
+}
+"""Every other number of a scenario must be positive; Drake checks those of ``plant``."""
+
+
+def robot_names() -> list[str]:
+    """Returns the names of the robots that a scenario may choose."""
+    (robot,) = (field.type for field in dataclasses.fields(Scenario) if field.name == "robot")
+    return sorted(kind().name for kind in typing.get_args(robot) or (robot,))  # type: ignore[operator]
+
+
+def validate(scenario: Scenario) -> None:
+    """Checks every value of a scenario; what passes can be built.
+
+    Raises:
+        ScenarioError: names the dotted place, the value and the remedy.
+        TaskError: for the task's name or text, and for a start that is not free.
+    """
+    for place, value in _numbers(scenario, ""):
+        _check_number(place, value)
+    _check_name("ablation", "ablation", scenario.ablation, ABLATIONS)
+    _check_name("renderer", "renderer", scenario.renderer, RENDERERS)
+    _check_name("robot", "robot.name", scenario.robot.name, robot_names())
+    for role in ("language_model", "vision_model"):
+        make_backend(getattr(scenario, role), place=role)
+    _check_order(scenario)
+    _check_plant(scenario)
+    _check_periods(scenario)
+    _check_tasks(scenario)
+    world = load_world(scenario.world.name, mirror=scenario.world.mirror)
+    parse_start(choose_task(scenario).start, world, radius=scenario.robot.radius)
+
+
+def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:
+    for field in dataclasses.fields(value):
+        below = getattr(value, field.name)
+        dotted = f"{place}.{field.name}" if place else field.name
+        if dataclasses.is_dataclass(below):
+            yield from _numbers(below, dotted)
+        elif isinstance(below, int | float) and not isinstance(below, bool):
+            yield dotted, below
+
+
+def _check_number(place: str, value: float) -> None:
+    expected, accepts = _RULES.get(place, _POSITIVE)
+    if not math.isfinite(value) or not accepts(value):
+        raise ScenarioError(f"{place}: {value} is not usable; give {expected}.")
+
+
+def _check_name(kind: str, place: str, name: str, valid: typing.Sequence[str]) -> None:
+    if name not in valid:
+        raise ScenarioError(unknown_name(kind, name, valid, place))
+
+
+def _check_order(scenario: Scenario) -> None:
+    robot, mapping = scenario.robot, scenario.mapping
+    for low, high, low_value, high_value in (
+        ("robot.min_depth", "robot.max_depth", robot.min_depth, robot.max_depth),
+        ("robot.min_depth", "mapping.max_range", robot.min_depth, mapping.max_range),
+        ("mapping.min_height", "mapping.max_height", mapping.min_height, mapping.max_height),
+        ("mapping.resolution", "mapping.max_range", mapping.resolution, mapping.max_range),
+    ):
+        if low_value >= high_value:
+            raise ScenarioError(
+                f"{low}: {low_value} is not below {high} ({high_value}); "
+                f"lower the one or raise the other."
+            )
+    if robot.turning_radius < robot.radius:
+        raise ScenarioError(
+            f"robot.turning_radius: {robot.turning_radius} is below robot.radius "
+            f"({robot.radius}); the circle swept in turning holds the robot."
+        )
+
+
+def _check_plant(scenario: Scenario) -> None:
+    if scenario.plant.time_step <= 0:
+        raise ScenarioError(
+            f"plant.time_step: {scenario.plant.time_step} is not usable; give a positive number "
+            "(the plant is discrete)."
+        )
+    try:
+        AddMultibodyPlant(scenario.plant, DiagramBuilder())
+    except RuntimeError as error:
+        raise ScenarioError(f"plant: Drake refuses it: {error}") from None
+
+
+def _check_periods(scenario: Scenario) -> None:
+    step = scenario.plant.time_step
+    for place, period in (
+        ("tick", scenario.tick),
+        ("robot.control_period", scenario.robot.control_period),
+    ):
+        steps = period / step
+        if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
+            raise ScenarioError(
+                f"{place}: {period} is not a multiple of plant.time_step ({step}); "
+                f"give e.g. {max(1, round(steps)) * step:g}."
+            )
+
+
+def _check_tasks(scenario: Scenario) -> None:
+    for name, task in scenario.tasks.items():
+        place = f"tasks.{name}"
+        if task.family not in FAMILIES:
+            raise ScenarioError(unknown_name("family", task.family, FAMILIES, f"{place}.family"))
+        try:
+            checked_task(task.text, task.family)
+        except TaskError as error:
+            raise ScenarioError(f"{place}.text: {error}") from None
+    if scenario.default_task:
+        _check_name("task", "default_task", scenario.default_task, sorted(scenario.tasks))
