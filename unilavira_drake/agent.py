@@ -65,9 +65,7 @@ def make_agent(
             detector=evidence(language_model),
         ),
     )
-    wiring.add(
-        "vision", lambda: Vision(period=tick, seed=seed, detector=evidence(vision_model))
-    )
+    wiring.add("vision", lambda: Vision(period=tick, seed=seed, detector=evidence(vision_model)))
     for role, model in (("language", language_model), ("vision", vision_model)):
         wiring.add(
             f"{role}_link",

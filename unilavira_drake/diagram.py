@@ -85,9 +85,10 @@ def make_navigation_diagram(
                 free_distance,
                 min_height=scenario.mapping.min_height,
                 max_height=scenario.mapping.max_height,
+                max_range=scenario.robot.max_depth,
             ),
             detector=functools.lru_cache(FRAMES_KEPT)(
-                detector or GroundTruthDetector(world.labels)
+                detector or GroundTruthDetector(world.labels, max_range=scenario.robot.max_depth)
             ),
             replace=own,
         ),

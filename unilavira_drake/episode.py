@@ -112,8 +112,6 @@ class _Run:
         wall, cpu = time.perf_counter(), time.process_time()
         ended = SimulatorStatus.ReturnReason.kReachedTerminationCondition
         try:
-            self._simulator.Initialize()
-            self._sample()
             while self._simulator.AdvanceTo(self._time() + SAMPLE_PERIOD).reason() != ended:
                 self._sample()
         except KeyboardInterrupt:

@@ -48,7 +48,7 @@ _RULES: dict[str, _Rule] = {
 def robot_names() -> list[str]:
     """Returns the names of the robots that a scenario may choose."""
     (robot,) = (field.type for field in dataclasses.fields(Scenario) if field.name == "robot")
-    return sorted(kind().name for kind in typing.get_args(robot) or (robot,))  # type: ignore[operator]
+    return sorted(kind().name for kind in typing.get_args(robot) or (robot,))
 
 
 def validate(scenario: Scenario) -> None:

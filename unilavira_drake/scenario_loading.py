@@ -118,7 +118,7 @@ def _find(name_or_file: str) -> Path:
 
 def _merged(text: str, name: str, defaults: Scenario) -> Scenario:
     try:
-        source = Source(name, text)
+        source = Source(name, text, numbered=name != "overlay")
         data = yaml_load_data(text)
     except yaml.YAMLError as error:
         raise ScenarioError(f"{name}: not valid YAML: {_first_line(error)}.") from None

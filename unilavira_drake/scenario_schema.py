@@ -23,13 +23,14 @@ class Source:
 
     Args:
         name: how messages call the text: a file's path, or ``overlay``.
+        numbered: whether messages give line numbers, as for a text that a person wrote.
     """
 
-    def __init__(self, name: str, text: str) -> None:
+    def __init__(self, name: str, text: str, *, numbered: bool) -> None:
         self.name = name
         self._lines: dict[tuple[str, ...], int] = {}
         root = yaml.compose(text, Loader=yaml.SafeLoader)
-        if root is not None:
+        if root is not None and numbered:
             self._index(root, (), 0)
 
     def place(self, path: tuple[str, ...]) -> str:
@@ -109,6 +110,7 @@ def _check_union(
         return
     tag = value.get("_tag") if isinstance(value, Mapping) else None
     if tag is None:
+        _suggest_tag(value, alternatives, source, path)
         _check_value(value, alternatives[0], source, path)
         return
     by_tag = {f"!{alternative.__name__}": alternative for alternative in alternatives}
@@ -116,6 +118,21 @@ def _check_union(
         raise ScenarioError(unknown_name("tag", str(tag), by_tag, source.place(path)))
     untagged = {key: item for key, item in value.items() if key != "_tag"}
     check_fields(untagged, by_tag[tag], source, path)
+
+
+def _suggest_tag(
+    value: Any, alternatives: tuple[Any, ...], source: Source, path: tuple[str, ...]
+) -> None:
+    """Without a tag the first alternative is meant; says so where the keys are another's."""
+    keys = {str(key) for key in value} if isinstance(value, Mapping) else set()
+    if not keys or keys <= set(_field_types(alternatives[0])):
+        return
+    for other in alternatives[1:]:
+        if keys <= set(_field_types(other)):
+            raise ScenarioError(
+                f"{source.place(path)}: {', '.join(sorted(keys))} needs a tag; "
+                f"write {path[-1]}: !{other.__name__} {{{min(keys)}: ...}}."
+            )
 
 
 def _check_scalar(value: Any, schema: type, source: Source, path: tuple[str, ...]) -> None:

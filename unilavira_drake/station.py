@@ -15,6 +15,7 @@ from unilavira_drake.resources import package_xml
 from unilavira_drake.robots.planar_base import PlanarBase
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.sensors.rig import add_renderer, add_rgbd_camera, front_intrinsics
+from unilavira_drake.sensors.scene_camera import SceneCamera
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.scenery import add_scenery, lights
@@ -72,7 +73,7 @@ def make_navigation_station(
         - contact_results
         - cheat_X_WB
 
-    Images are rendered only when pulled.  ``cheat_X_WB`` is the true pose: for scoring only.
+    Images are rendered only when pulled, by one renderer for all clones of a Context.  ``cheat_X_WB`` is the true pose: for scoring only.
 
     Args:
         scenario: what to build.
@@ -88,20 +89,26 @@ def make_navigation_station(
     if start is None:
         start = parse_start(choose_task(scenario).start, world, radius=scenario.robot.radius)
     builder = DiagramBuilder()
-    plant, scene_graph = AddMultibodyPlant(scenario.plant, builder)
-    add_scenery(plant, scene_graph, world)
-    robot = _add_robot(plant, scenario.robot.name)
-    plant.Finalize()
+    plant, scene_graph, robot = _add_scene(builder, scenario, world)
     plant.SetDefaultPositions(robot, list(start))
-    add_renderer(scene_graph, lights(mirrored=world.mirrored))
     _add_base(builder, plant, robot)
-    _add_front_camera(builder, plant, scene_graph, scenario)
+    _add_front_camera(builder, plant, scenario, world)
     builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
     if scenario.meshcat:
         _add_meshcat(builder, scene_graph)
     station = builder.Build()
     station.set_name("station")
     return station
+
+
+def _add_scene(
+    builder: DiagramBuilder, scenario: Scenario, world: World
+) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
+    plant, scene_graph = AddMultibodyPlant(scenario.plant, builder)
+    add_scenery(plant, scene_graph, world)
+    robot = _add_robot(plant, scenario.robot.name)
+    plant.Finalize()
+    return plant, scene_graph, robot
 
 
 def _add_robot(plant: MultibodyPlant, name: str) -> ModelInstanceIndex:
@@ -127,9 +134,23 @@ def _add_base(builder: DiagramBuilder, plant: MultibodyPlant, robot: ModelInstan
 
 
 def _add_front_camera(
-    builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph, scenario: Scenario
+    builder: DiagramBuilder, plant: MultibodyPlant, scenario: Scenario, world: World
 ) -> None:
+    scene, X_BC = _picture_scene(scenario, world)
+    camera = builder.AddNamedSystem("front_camera", SceneCamera(scene))
+    builder.Connect(plant.get_state_output_port(), camera.GetInputPort("plant_state"))
+    for port in ("color_image", "depth_image", "label_image"):
+        builder.ExportOutput(camera.GetOutputPort(port), f"front.{port}")
+    mount = builder.AddNamedSystem("front_mount", ConstantValueSource(AbstractValue.Make(X_BC)))
+    builder.ExportOutput(mount.get_output_port(), "front.X_BC")
+
+
+def _picture_scene(scenario: Scenario, world: World) -> tuple[Diagram, RigidTransform]:
+    """Returns the scene that is rendered, and the camera's pose in its body."""
     robot = scenario.robot
+    builder = DiagramBuilder()
+    plant, scene_graph, _ = _add_scene(builder, scenario, world)
+    add_renderer(scene_graph, lights(mirrored=world.mirrored))
     sensor, X_BC = add_rgbd_camera(
         builder,
         plant,
@@ -139,11 +160,10 @@ def _add_front_camera(
         min_depth=robot.min_depth,
         max_depth=robot.max_depth,
     )
-    builder.ExportOutput(sensor.color_image_output_port(), "front.color_image")
-    builder.ExportOutput(sensor.depth_image_32F_output_port(), "front.depth_image")
-    builder.ExportOutput(sensor.label_image_output_port(), "front.label_image")
-    mount = builder.AddNamedSystem("front_mount", ConstantValueSource(AbstractValue.Make(X_BC)))
-    builder.ExportOutput(mount.get_output_port(), "front.X_BC")
+    builder.ExportOutput(sensor.color_image_output_port(), "color_image")
+    builder.ExportOutput(sensor.depth_image_32F_output_port(), "depth_image")
+    builder.ExportOutput(sensor.label_image_output_port(), "label_image")
+    return builder.Build(), X_BC
 
 
 def _add_meshcat(builder: DiagramBuilder, scene_graph: SceneGraph) -> None:

@@ -44,9 +44,7 @@ class Wiring:
         Raises:
             PortTypeError: if a replaced level lacks the port.
         """
-        self._builder.Connect(
-            self._output(source, port), self._input(target, target_port or port)
-        )
+        self._builder.Connect(self._output(source, port), self._input(target, target_port or port))
 
     def take_input(self, name: str, *levels: str) -> None:
         """Makes an input port of the Diagram that feeds the port of that name of each level."""

@@ -211,5 +211,8 @@ def test_interrupt_ends_the_wait_and_the_process() -> None:
         assert process.stdout is not None
         assert process.stdout.readline() == "asked\n"
         process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=30.0)
+        try:
+            out, _ = process.communicate(timeout=30.0)
+        finally:
+            process.kill()
     assert (out, process.returncode) == ("interrupted\n", 0)

@@ -1,5 +1,6 @@
 """The tracking laws in closed loop with a delayed, lagging base, and the controller System."""
 
+import itertools
 import math
 from collections import deque
 
@@ -48,7 +49,7 @@ class Base:
 
 
 def drive(points, yaw, base, *, start=None, duration=60.0):
-    """Follows a polyline; returns rows (t, x, y, cross-track error, speed command, rate command)."""
+    """Follows a polyline; returns rows (t, x, y, cross-track error, speed and rate command)."""
     p_WP = read_only(np.array(points, float))
     x, y = points[0] if start is None else start
     robot = Base(x, y, yaw, *base)
@@ -138,7 +139,7 @@ def test_paths_through_doors_are_followed_within_a_decimetre(points, base):
     rows = drive(points, 0.0, base)
     assert rows[:, 3].max() <= 0.1
     assert math.dist(points[-1], rows[-1, 1:3]) <= 0.06
-    length = sum(math.dist(a, b) for a, b in zip(points, points[1:], strict=False))
+    length = sum(math.dist(a, b) for a, b in itertools.pairwise(points))
     assert length / rows[-1, 0] > 0.4
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from pydrake.common import pretty_class_name
 from pydrake.systems.framework import (
     Diagram,
-    InputPortIndex,
-    OutputPortIndex,
+    OutputPort,
     PortDataType,
     System,
 )
@@ -53,7 +54,8 @@ def ports(
     table = Table("system", "direction", "port", "carries")
     for row in _rows(diagram):
         table.add_row(*row)
-    Console(width=None).print(table)
+    # A file has no width: nothing is cut there.
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
 
 
 def _ignore(t: float, system: str, event: str, message: object) -> None:
@@ -70,14 +72,18 @@ def _rows(diagram: Diagram, prefix: str = "") -> Iterator[tuple[str, str, str, s
 
 def _port_rows(name: str, system: System) -> Iterator[tuple[str, str, str, str]]:
     for index in range(system.num_input_ports()):
-        port = system.get_input_port(InputPortIndex(index))
-        vector = port.get_data_type() == PortDataType.kVectorValued
-        carries = f"vector {port.size()}" if vector else "message"
-        yield name, "in", port.get_name(), carries
+        entry = system.get_input_port(index)
+        vector = entry.get_data_type() == PortDataType.kVectorValued
+        carries = f"vector {entry.size()}" if vector else ""
+        yield name, "in", entry.get_name(), carries
     for index in range(system.num_output_ports()):
-        port = system.get_output_port(OutputPortIndex(index))
-        if port.get_data_type() == PortDataType.kVectorValued:
-            yield name, "out", port.get_name(), f"vector {port.size()}"
-        else:
-            kind = type(port.Allocate().get_value()).__name__
-            yield name, "out", port.get_name(), kind
+        exit_ = system.get_output_port(index)
+        vector = exit_.get_data_type() == PortDataType.kVectorValued
+        carries = f"vector {exit_.size()}" if vector else _type_name(exit_)
+        yield name, "out", exit_.get_name(), carries
+
+
+def _type_name(port: OutputPort) -> str:
+    allocated: Any = port.Allocate()
+    name: str = pretty_class_name(type(allocated.get_value()))
+    return name

@@ -105,7 +105,10 @@ class Progress:
 
     def _line(self, text: str, style: str = "") -> None:
         line = Text(" ".join(text.split("\n")), style=style)
-        self.console.print(line, overflow="ellipsis", no_wrap=text.startswith(_INDENT))
+        if self.console.is_terminal and text.startswith(_INDENT):
+            self.console.print(line, overflow="ellipsis", no_wrap=True)
+        else:
+            self.console.print(line, soft_wrap=True)
 
     def _now(self, t: float, message: Any) -> None:
         if self._status is None:

@@ -11,6 +11,7 @@ from rich.table import Table
 from unilavira_drake.messages.metrics import CAUSES
 from unilavira_drake.recording.result import EpisodeResult
 
+_YES_NO = {True: "yes", False: "no", None: "-"}
 _VERDICTS = {True: "success", False: "no success", None: "not scored"}
 
 
@@ -44,6 +45,7 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
     metrics, counts = result.metrics, result.counts
     rows = [
         ("navigation error", _metres(metrics.navigation_error_m)),
+        ("stopped within 3 m", _YES_NO[metrics.success_3m]),
         ("path length", _metres(metrics.path_length_m)),
         ("shortest path", _metres(metrics.shortest_path_m)),
         ("SPL", "-" if metrics.spl is None else f"{metrics.spl:.2f}"),

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.errors import TaskError, unknown_name
-from unilavira_drake.evaluation.free_space import FreeSpace
+from unilavira_drake.evaluation.free_space import centers, in_rooms
 from unilavira_drake.messages import Message
+from unilavira_drake.planning.geodesic import FreeSpace
 from unilavira_drake.worlds.clearance import clearance
-from unilavira_drake.worlds.world import World, WorldObject
+from unilavira_drake.worlds.world import World
 
 REACH = 0.15
 """The footprint of a thing is the free floor not farther from it than the nearest free place plus
@@ -76,16 +77,9 @@ def footprint(target: GoalTarget, world: World, space: FreeSpace) -> NDArray[np.
     Raises:
         TaskError: if no free floor is near.
     """
-    cells = np.argwhere(space.free)
-    points = space.centers(cells)
-    if target.kind == "point":
-        assert target.point is not None
-        gaps = np.hypot(*(points - np.array(target.point)).T)
-    else:
-        inside = _inside(target, world, points)
-        cells, points = cells[inside], points[inside]
-        thing = world.object(target.text)
-        gaps = np.zeros(len(cells)) if target.kind == "room" else _gaps(thing, points)
+    cells = np.argwhere(space.free & in_rooms(space, world, target.rooms))
+    points = centers(space, cells)
+    gaps = _gaps(target, world, points)
     nearest = float(gaps.min(initial=math.inf))
     if nearest > MAX_GAP:
         raise TaskError(
@@ -109,7 +103,8 @@ def _resolve(text: str, world: World) -> GoalTarget:
         return GoalTarget(text, "room", (room.name,))
     if "," in text:
         return _point(text, world)
-    names = {thing.name for thing in world.objects} | {room.name for room in world.rooms}
+    names = {thing.name for thing in world.objects}
+    names |= {name for room in world.rooms for name in (room.name, room.kind) if name}
     raise TaskError(unknown_name("instance or room", text, names, "goal"))
 
 
@@ -130,18 +125,14 @@ def _point(text: str, world: World) -> GoalTarget:
     return GoalTarget(text, "point", (room.name,), point=(x, y))
 
 
-def _inside(target: GoalTarget, world: World, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    inside = np.zeros(len(points), np.bool_)
-    for room in world.rooms:
-        if room.name in target.rooms:
-            low, high = np.array(room.rectangle[:2]), np.array(room.rectangle[2:])
-            inside |= ((points >= low) & (points < high)).all(axis=1)
-    return inside
-
-
-def _gaps(thing: WorldObject | None, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distances on the floor between points and a thing, at whatever height it hangs."""
-    assert thing is not None
+def _gaps(target: GoalTarget, world: World, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distances on the floor between points and a target, at whatever height it hangs."""
+    thing = world.object(target.text)
+    if target.point is not None:
+        gaps: NDArray[np.float64] = np.hypot(*(points - np.array(target.point)).T)
+        return gaps
+    if thing is None:
+        return np.zeros(len(points))
     grounded = tuple(
         dataclasses.replace(box, center=(*box.center[:2], 0.5), size=(*box.size[:2], 1.0))
         for box in thing.boxes

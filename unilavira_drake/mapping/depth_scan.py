@@ -24,7 +24,7 @@ LIMIT = 40
 MIN_HITS = 2
 """Depth readings in a cell that make it occupied: one alone may be noise."""
 FLOOR_TOLERANCE = 0.15
-"""Readings this far below the floor still are the floor; lower ones are a hole, metres."""
+"""Readings this far below the floor still are the floor; lower ones show a drop, metres."""
 HIT_DEPTH = 0.2
 """Hits are pushed this share of a cell along their ray: a surface on the border of two cells
 belongs to the cell behind it, from either side and in a mirrored world."""
@@ -59,7 +59,6 @@ def scan(
     low, high, height, reach = band[0], band[1], band[2], band[3]
     forward_x, forward_y, cells = grid[0], grid[1], 1.0 / grid[2]
     row0, column0 = int(grid[3]), int(grid[4])
-    near, far, floor = bearings[0], bearings[1], bearings[2]
     per_bearing, first = camera[0] / stride, (cx + 0.5) / stride
     per_x, per_y = 1.0 / camera[0], 1.0 / camera[1]
     for v in range(stride // 2, depth.shape[0], stride):
@@ -68,30 +67,31 @@ def scan(
         right_row = rays[1, 1] * y + rays[1, 2]
         up_row = rays[2, 1] * y + rays[2, 2]
         for u in columns:
-            d = np.float64(depth[v, u])
+            reading = np.float64(depth[v, u])
             x = (u - cx) * per_x
             forward = rays[0, 0] * x + forward_row
-            if not (d > 0.0 and forward > 0.0):
+            if not (reading > 0.0 and forward > 0.0):
                 continue
             right = rays[1, 0] * x + right_row
             up = rays[2, 0] * x + up_row
             sideways = forward * forward + right * right
+            d = reading
             beyond = d * d * sideways > reach * reach
             if beyond:
                 # Nothing up to the range: it tells something where the ray stays in the band.
                 d = reach / math.sqrt(sideways)
             h = height + d * up
-            if h > high or h < -FLOOR_TOLERANCE:
+            if h < -FLOOR_TOLERANCE:
+                if height <= 0.0 or reading == np.inf:
+                    continue
+                # No floor where the ray passes its level: a drop, to be kept away from.
+                d, h, beyond = d * height / (height - h), low, False
+            if h > high:
                 continue
             ahead = d * forward
             slope = right / forward
             bearing = math.floor(slope * per_bearing + first)
-            if 0 <= bearing < near.size:
-                far[bearing] = max(far[bearing], ahead)
-                if h >= low and not beyond:
-                    near[bearing] = min(near[bearing], ahead)
-                elif not beyond:
-                    floor[bearing] = min(floor[bearing], ahead)
+            _note(bearings, bearing, ahead, h >= low, beyond)
             if h < low or beyond:
                 continue
             ahead += HIT_DEPTH * grid[2]
@@ -100,6 +100,18 @@ def scan(
             row = math.floor(y_hit * cells) - row0
             column = math.floor(x_hit * cells) - column0
             _count(hits, row, column)
+
+
+@inlined_kernel
+def _note(
+    bearings: NDArray[np.float64], bearing: int, ahead: float, obstacle: bool, beyond: bool
+) -> None:
+    if bearing < 0 or bearing >= bearings.shape[1]:
+        return
+    bearings[1, bearing] = max(bearings[1, bearing], ahead)
+    if not beyond:
+        nearest = 0 if obstacle else 2
+        bearings[nearest, bearing] = min(bearings[nearest, bearing], ahead)
 
 
 @inlined_kernel

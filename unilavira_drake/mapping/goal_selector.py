@@ -121,7 +121,7 @@ class GoalSelector(LeafSystem):
         self.DeclareAbstractOutputPort(
             "goal",
             lambda: AbstractValue.Make(Goal()),
-            self._calc_goal,
+            self._calc_goal,  # type: ignore[arg-type]
             prerequisites_of_calc={reader.ticket for reader in readers},
         )
 

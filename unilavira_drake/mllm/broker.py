@@ -8,6 +8,7 @@ cloned while a call was under way needs no second call, and both clones read the
 from __future__ import annotations
 
 import collections
+import contextlib
 import threading
 import time
 from concurrent.futures import Future, InvalidStateError
@@ -16,6 +17,8 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from unilavira_drake.errors import MllmError, MllmTimeout
 from unilavira_drake.mllm.request import Completion, Mllm, MllmRequest
 
+_WAITING_SLICE = 0.2
+"""Wall-clock seconds after which an interrupt is noticed at the latest."""
 _CLOSING_TIME = 1.0
 """Wall-clock seconds that ``close`` waits for calls under way."""
 
@@ -68,13 +71,15 @@ class Broker:
                 was closed before the reply came.
         """
         future = self._future(request)
-        try:
-            return future.result(timeout=self._deadline)
-        except MllmError:
-            raise
-        except (TimeoutError, FutureTimeoutError):  # One class from Python 3.11 on.
-            # The worker may have settled it in this very moment; then its word stands.
-            _settle(future, error=MllmTimeout(f"no reply within {self._deadline:g} s."))
+        until = time.monotonic() + self._deadline
+        while not future.done():
+            remaining = until - time.monotonic()
+            if remaining <= 0.0:
+                # The worker may settle it in this very moment; the first word stands.
+                _settle(future, error=MllmTimeout(f"no reply within {self._deadline:g} s."))
+            # In slices: an interrupt that comes just before a wait is seen only after it.
+            with contextlib.suppress(FutureTimeoutError):
+                future.exception(timeout=min(max(remaining, 0.0), _WAITING_SLICE))
         return future.result()
 
     def close(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from typing import TYPE_CHECKING
 
 import cv2
@@ -21,7 +22,7 @@ _WIDTH = 10.0
 _DPI = 120
 _MARGIN = 0.3
 """Metres around the rooms."""
-_UNKNOWN, _FREE, _OCCUPIED = 0.90, 1.0, 0.45
+_UNKNOWN, _FREE, _OCCUPIED = 0.92, 1.0, 0.68
 """Grey of the mapped cells."""
 
 
@@ -51,7 +52,8 @@ def map_picture(
     figure.set_layout_engine("constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal", title=title)
+    axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal")
+    axes.set_title(textwrap.fill(title, 110, max_lines=4, placeholder=" …"), fontsize=10)
     axes.set(xlabel="x [m]", ylabel="y [m]", facecolor=str(_UNKNOWN))
     if occupancy is not None:
         _draw_occupancy(axes, occupancy)
@@ -92,7 +94,7 @@ def _draw_world(axes: Axes, world: World) -> None:
     from matplotlib.patches import Polygon
 
     for room in world.rooms:
-        x_min, y_min, x_max, y_max = room.rectangle
+        x_min, _, x_max, y_max = room.rectangle
         axes.text(
             (x_min + x_max) / 2,
             y_max - 0.2,
@@ -115,8 +117,16 @@ def _draw_world(axes: Axes, world: World) -> None:
             while any(np.all(np.abs(place - other) < (0.6, 0.2)) for other in labels):
                 place = place - (0.0, 0.2)
             labels.append(place)
-            style = {"ha": "center", "va": "center", "fontsize": 6, "color": "tab:brown"}
-            axes.text(*place, thing.name, zorder=2, **style)
+            axes.text(
+                place[0],
+                place[1],
+                thing.name,
+                ha="center",
+                va="center",
+                fontsize=6,
+                color="tab:brown",
+                zorder=2,
+            )
     for corners, color in outlines:
         axes.add_patch(Polygon(corners, fill=False, linewidth=0.6, edgecolor=color, zorder=1))
 
@@ -161,14 +171,14 @@ def _draw_places(axes: Axes, trace: EpisodeTrace, goals: tuple[tuple[float, floa
             "o",
             color="white",
             markeredgecolor="black",
-            markersize=11,
-            zorder=6,
+            markersize=10,
+            zorder=7,
             label="waypoint" if index == 0 else "_",
         )
-        axes.text(x, y, str(waypoint), ha="center", va="center", fontsize=7, zorder=7)
+        axes.text(x, y, str(waypoint), ha="center", va="center", fontsize=7, zorder=8)
     if len(points):
-        axes.plot(*points[0, 1:], "s", color="tab:green", markersize=6, zorder=8, label="start")
-        axes.plot(*points[-1, 1:], "D", color="tab:red", markersize=6, zorder=8, label="end")
+        axes.plot(*points[0, 1:], "s", color="tab:green", markersize=14, zorder=6, label="start")
+        axes.plot(*points[-1, 1:], "D", color="tab:red", markersize=12, zorder=6, label="end")
     if goals:
         axes.plot(
             *np.array(goals).T,

@@ -49,8 +49,8 @@ class EpisodeTrace:
         elif isinstance(message, Goal):
             if message.kind == "go" and message.p_WG is not None:
                 self.goals.append(message.p_WG[:2])
-        elif isinstance(message, NavigationStatus) and message.terminal:
-            if message.n in self._departures:
+        elif isinstance(message, NavigationStatus):
+            if message.terminal and message.n in self._departures:
                 self._backtracks[message.n] = (self._departures[message.n], t)
 
     def _place_waypoint(self, request: MllmRequest) -> None:

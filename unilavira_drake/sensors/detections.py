@@ -54,6 +54,7 @@ class GroundTruthDetector:
         self._wanted = np.zeros(32768, dtype=bool)
         for label, meaning in self._labels.items():
             self._wanted[label] = meaning.category != "wall"
+        warm_up()
 
     def __call__(self, frame: Frame) -> ViewEvidence:
         """Returns the detections of a view; ids count in the order of the labels."""

@@ -44,7 +44,7 @@ def front_intrinsics(robot: CameraModel) -> Intrinsics:
 def pinhole(width: int, height: int, horizontal_fov_degrees: float) -> Intrinsics:
     """Returns square-pixel intrinsics with the principal point in the image's middle.
 
-    Pixel centres have integer coordinates, as in Drake's ``CameraInfo``.
+    Pixel centres have integer coordinates.
     """
     focal = width / (2.0 * math.tan(math.radians(horizontal_fov_degrees) / 2.0))
     return Intrinsics(width, height, focal, focal, width / 2 - 0.5, height / 2 - 0.5)
@@ -76,6 +76,8 @@ def add_rgbd_camera(
     """
     frame: Any = plant.GetFrameByName(frame_name)
     X_BC: RigidTransform = frame.GetFixedPoseInBodyFrame()
+    # Measured on rendered depth (1.51, 1.58): Drake's renderer takes the principal point in
+    # coordinates whose integers are pixel corners, half a pixel from ours.
     core = RenderCameraCore(
         RENDERER,
         CameraInfo(
@@ -83,8 +85,8 @@ def add_rgbd_camera(
             intrinsics.height,
             intrinsics.fx,
             intrinsics.fy,
-            intrinsics.cx,
-            intrinsics.cy,
+            intrinsics.cx + 0.5,
+            intrinsics.cy + 0.5,
         ),
         ClippingRange(min(0.05, min_depth), max(40.0, 2.0 * max_depth)),
         RigidTransform(),

@@ -87,7 +87,7 @@ def _check(data: Any, schema: type, place: str) -> None:
 
 def _typed(schema: type, text: str, place: str) -> Any:
     try:
-        return yaml_load_typed(schema=schema, data=text)  # type: ignore[no-untyped-call]
+        return yaml_load_typed(schema=schema, data=text)
     except (RuntimeError, ValueError, TypeError, AttributeError) as error:
         raise ScenarioError(f"{place}: wrong type: {error}") from None
 

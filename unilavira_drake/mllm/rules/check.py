@@ -7,6 +7,7 @@ from typing import Any
 
 from unilavira_drake.mllm.rules.clauses import Clause, describe
 from unilavira_drake.mllm.rules.lexicon import tokenize
+from unilavira_drake.mllm.rules.progress import review
 from unilavira_drake.mllm.rules.situation import Situation
 
 UNKNOWN = "unknown"
@@ -14,7 +15,9 @@ UNKNOWN = "unknown"
 
 def double_check(situation: Situation) -> dict[str, Any]:
     """Returns the verdict: confirmed only if every step is done and the last target is here."""
-    open_steps = situation.pending
+    # Without a TODO list nothing tells which steps the last decision closed: look again.
+    listed = situation.variables.todo is not None
+    open_steps = situation.pending if listed else review(situation).pending
     if open_steps:
         reason = f"not done: {describe(open_steps[0].clause)}"
         return {"reasoning": reason, "confirmed": False, "reason": reason}

@@ -40,12 +40,12 @@ def decide(situation: Situation) -> dict[str, Any]:
     if not progress.pending:
         reply["reasoning_action"] = "Every step is done and the target is here: check and stop."
         return _without_list(reply, situation)
-    reopened = [s for s in progress.pending if s in situation.steps and _was_done(s, situation)]
+    reopened = [s for s in progress.pending if _was_done(s, situation)]
     updates += [
         {"op": "update", "index": s.index, "status": "pending", "result": "not in reach after all"}
         for s in reopened
     ]
-    aim = aim_of(progress.steps)
+    aim = aim_of(progress.steps, situation.scene.room)
     ranked = options(situation, aim)
     place = _way_back(situation, aim, ranked)
     if place is not None:
@@ -59,8 +59,9 @@ def decide(situation: Situation) -> dict[str, Any]:
         reply["reasoning_action"] = _reason(ranked[0], aim)
         updates += _turn_taken(aim.turn, ranked[0])
     else:
-        reply["action"] = {"tool": "turn", "direction": "back"}
-        reply["reasoning_action"] = "Nothing is in view; look for a way behind the robot."
+        blind = "left" if situation.variables.failed_direction == "back" else "back"
+        reply["action"] = {"tool": "turn", "direction": blind}
+        reply["reasoning_action"] = "Nothing is in view that leads on: look elsewhere."
     return _without_list(reply, situation)
 
 
@@ -113,9 +114,11 @@ def _way_back(situation: Situation, aim: Aim, ranked: list[Option]) -> Place | N
         cost = _RETURN + 0.3 * place.distance
         if goal is not None and goal.category and remembers(place, goal) and not place.tried:
             cost -= 10.0
-        elif not (is_hub(place.room) or open_ends(place, situation.visited)):
-            continue
-        elif situation.scene.room == place.room or explored("", place.position, ()):
+        elif (
+            not (is_hub(place.room) or open_ends(place, situation.visited))
+            or situation.scene.room == place.room
+            or explored("", place.position, ())
+        ):
             continue
         costs.append((round(cost, 3), -place.id, place))
     if not costs or min(costs)[0] >= best:

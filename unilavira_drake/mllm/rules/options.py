@@ -37,12 +37,6 @@ class Option:
     """Detection that shows it."""
 
     @property
-    def position(self) -> tuple[float, float]:
-        """(x ahead, y to the left), metres."""
-        angle = math.radians(self.bearing)
-        return self.distance * math.cos(angle), self.distance * math.sin(angle)
-
-    @property
     def order(self) -> str:
         """The sentence that tells the vision model what to ground."""
         axis = math.degrees(VIEW_YAW[self.direction])
@@ -75,10 +69,14 @@ class Aim:
         return any(c.kind == "end" for c in self.soft)
 
 
-def aim_of(steps: Sequence[Step]) -> Aim:
-    """Returns what the pending steps of a plan ask of the next move."""
+def aim_of(steps: Sequence[Step], room: str) -> Aim:
+    """Returns what the pending steps of a plan ask of the next move in a kind of room.
+
+    To walk along the room that the robot is in says how to go on, not where to be.
+    """
     pending = [s for s in steps if not s.done]
-    at = next((i for i, s in enumerate(pending) if s.clause.hard), len(pending))
+    here = [s for s in pending if s.clause.kind == "along" and s.clause.room in ("", room)]
+    at = next((i for i, s in enumerate(pending) if s.clause.hard and s not in here), len(pending))
     goal = pending[at].clause if at < len(pending) else None
     first = pending[0] if pending else None
     turn = first if first is not None and first.clause.kind in ("turn", "straight") else None
@@ -90,7 +88,10 @@ def aim_of(steps: Sequence[Step]) -> Aim:
 
 
 def options(situation: Situation, aim: Aim) -> list[Option]:
-    """Returns every option, cheapest first; equal costs are ordered by the call's seed."""
+    """Returns every option, cheapest first; equal costs are ordered by the call's seed.
+
+    After a backtrack the direction that has failed from here is no option.
+    """
     found = [
         *_things(situation, aim),
         *_passing(situation, aim),
@@ -98,6 +99,8 @@ def options(situation: Situation, aim: Aim) -> list[Option]:
         *_floors(situation, aim),
         *_open_floor(situation, aim),
     ]
+    failed = situation.variables.failed_direction
+    found = [option for option in found if option.direction != failed]
     coin = -1 if situation.key % 2 else 1
     return sorted(found, key=lambda o: (round(o.cost, 3), coin * o.bearing))
 
@@ -127,8 +130,6 @@ def _failure_cost(situation: Situation, direction: str) -> float:
     cost = 0.0
     if any(t.startswith(f"{direction}: failed") for t in tried):
         cost += 25.0
-    if situation.variables.failed_direction == direction:
-        cost += 10.0
     return cost
 
 
@@ -271,13 +272,12 @@ def _open_floor(situation: Situation, aim: Aim) -> Iterator[Option]:
             (f for f in scene.floors if f.direction == direction and f.room == scene.room), None
         )
         cites = floor.id if floor else scene.room_id
-        option = Option(direction, bearing, reach, "open floor", cost, "unseen floor", cites)
-        near = min(
-            (math.dist(option.position, p.position) for p in situation.places if p.distance > 0.6),
-            default=math.inf,
+        ahead = (reach * math.cos(math.radians(bearing)), reach * math.sin(math.radians(bearing)))
+        visited = any(
+            math.dist(ahead, p.position) < 1.5 for p in situation.places if p.distance > 0.6
         )
-        seen = 6.0 if near < 1.5 else 0.0
-        yield Option(direction, bearing, reach, "open floor", cost + seen, "open floor", cites)
+        cost += 6.0 if visited else 0.0
+        yield Option(direction, bearing, reach, "open floor", cost, "free floor ahead", cites)
 
 
 def _open_cost(situation: Situation, aim: Aim, direction: str, free: float) -> float:

@@ -16,8 +16,23 @@ from unilavira_drake.mllm.rules.nouns import DOOR, Noun, read_noun
 
 _NEW_ACTION = ("move", "stop", "turn", "turn_back", "search", "leave", "out")
 _ROLE_VERBS = frozenset(
-    "enter entering cross crossing pass passing follow following approach approaching reach "
-    "find locate visit traverse".split()
+    [
+        "enter",
+        "entering",
+        "cross",
+        "crossing",
+        "pass",
+        "passing",
+        "follow",
+        "following",
+        "approach",
+        "approaching",
+        "reach",
+        "find",
+        "locate",
+        "visit",
+        "traverse",
+    ]
 )
 
 

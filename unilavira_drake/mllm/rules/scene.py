@@ -15,6 +15,10 @@ from unilavira_drake.mllm.rules.floor_camera import FloorCamera
 from unilavira_drake.mllm.rules.vocabulary import class_match, color_name, room_kind, thing_class
 
 
+_AT_HAND = 1.2
+"""Metres."""
+
+
 @dataclass(frozen=True)
 class Sight:
     """One detection, placed relative to the robot: x ahead, y to the left, metres."""
@@ -92,7 +96,7 @@ def look(views: Sequence[ViewEvidence], notes: Sequence[ViewNote]) -> Scene:
     sights = [_sight(d, view, camera) for view in views for d in view.detections]
     floors = tuple(s for s in sights if s.category == "floor")
     doors = [s for s in sights if s.category == "door"]
-    room, room_id = _underfoot(floors, views)
+    room, room_id = _underfoot(floors, doors, views)
     things = tuple(s for s in sights if s.category not in ("floor", "door", "wall", "ceiling"))
     return Scene(
         room=room,
@@ -126,20 +130,32 @@ def _sight(detection: Detection, view: ViewEvidence, camera: FloorCamera) -> Sig
     )
 
 
-def _underfoot(floors: Sequence[Sight], views: Sequence[ViewEvidence]) -> tuple[str, str]:
-    """Returns the kind of room whose floor fills most of the nearest image rows, and its id."""
-    bottom = {view.direction: view.height - 3 for view in views}
-    weights: dict[str, float] = {}
+def _underfoot(
+    floors: Sequence[Sight], doors: Sequence[Sight], views: Sequence[ViewEvidence]
+) -> tuple[str, str]:
+    """Returns the kind of room underfoot and the detection that shows it.
+
+    Each view votes with the shares of the floors that reach its lower edge; a floor behind a
+    door frame counts little.  The camera never sees the floor under the robot itself.
+    """
+    votes: dict[str, float] = {}
     largest: dict[str, Sight] = {}
-    for floor in floors:
-        near = floor.detection.box[3] >= bottom[floor.direction]
-        weight = floor.pixels * (1.0 if near else 0.1)
-        weights[floor.room] = weights.get(floor.room, 0.0) + weight
-        if floor.room not in largest or floor.pixels > largest[floor.room].pixels:
-            largest[floor.room] = floor
-    if not weights:
+    for view in views:
+        weights: list[tuple[Sight, float]] = []
+        for floor in (f for f in floors if f.direction == view.direction):
+            near = floor.detection.box[3] >= view.height - 3
+            framed = any(_inside(floor, d) and floor.near > d.distance for d in doors)
+            weight = floor.pixels * (1.0 if near else 0.1) * (0.2 if framed else 1.0)
+            weights.append((floor, weight))
+        area = 0.02 * view.width * view.height
+        total = max(sum(weight for _, weight in weights), area)
+        for floor, weight in weights:
+            votes[floor.room] = votes.get(floor.room, 0.0) + weight / total
+            if floor.room not in largest or floor.pixels > largest[floor.room].pixels:
+                largest[floor.room] = floor
+    if not votes:
         return "", ""
-    room = max(weights, key=lambda kind: weights[kind])
+    room = max(votes, key=lambda kind: votes[kind])
     return room, largest[room].id
 
 
@@ -179,6 +195,11 @@ def _door_exit(door: Sight, floors: Sequence[Sight], room: str) -> Exit:
         for f in floors
         if f.room != room and _inside(f, door) and f.distance > door.distance - 0.4
     ]
+    if not beyond and door.distance < _AT_HAND:
+        # So near that the frame fills the gap between two views: the floor behind is in another.
+        beyond = [
+            f for f in floors if f.room != room and angle_between(f.bearing, door.bearing) < 40.0
+        ]
     if not beyond:
         return Exit("", door)
     nearest = min(beyond, key=lambda f: f.near)

@@ -1,0 +1,66 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from unilavira_drake.errors import PortTypeError
+from unilavira_drake.robots.planar_base import PlanarBase, planar_pose, world_velocity
+
+SPEED = st.floats(-2, 2)
+ANGLE = st.floats(-7, 7)
+
+
+def evaluate(system, port, command=(0.0, 0.0, 0.0), state=(0.0,) * 6):
+    context = system.CreateDefaultContext()
+    system.GetInputPort("base_command").FixValue(context, np.array(command))
+    system.GetInputPort("joint_state").FixValue(context, np.array(state))
+    return system.GetOutputPort(port).Eval(context)
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(vx=SPEED, vy=SPEED, wz=SPEED, yaw=ANGLE)
+def test_twist_of_the_desired_motion_is_the_command(vx, vy, wz, yaw):
+    for holonomic in (True, False):
+        velocity = world_velocity(np.array([vx, vy, wz]), yaw, holonomic=holonomic)
+        twist = evaluate(PlanarBase(), "twist", state=(1.0, 2.0, yaw, *velocity))
+        expected = [0, 0, wz, vx, vy if holonomic else 0.0, 0]
+        assert twist == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_differential_base_ignores_sideways_commands():
+    state = (0.0, 0.0, math.pi / 2, 0.0, 0.0, 0.0)
+    desired = evaluate(PlanarBase(), "desired_joint_state", (0.4, 0.3, 0.2), state)
+    assert desired == pytest.approx([0, 0, 0, 0, 0.4, 0.2])
+    desired = evaluate(PlanarBase(holonomic=True), "desired_joint_state", (0.4, 0.3, 0.2), state)
+    assert desired == pytest.approx([0, 0, 0, -0.3, 0.4, 0.2])
+
+
+@settings(derandomize=True, deadline=None, max_examples=20)
+@given(x=SPEED, y=SPEED, yaw=ANGLE)
+def test_pose_is_drakes(x, y, yaw):
+    pose = evaluate(PlanarBase(), "pose_estimate", state=(x, y, yaw, 0.0, 0.0, 0.0))
+    assert isinstance(pose, RigidTransform)
+    expected = RigidTransform(RollPitchYaw(0, 0, yaw), [x, y, 0])
+    assert pose.IsNearlyEqualTo(expected, 1e-12)
+    assert planar_pose(x, y, yaw).IsNearlyEqualTo(expected, 1e-12)
+
+
+def test_pose_and_twist_do_not_depend_on_the_command():
+    system = PlanarBase()
+    command = system.GetInputPort("base_command").get_index()
+    assert {
+        name
+        for name in ("desired_joint_state", "pose_estimate", "twist")
+        if system.HasDirectFeedthrough(command, system.GetOutputPort(name).get_index())
+    } == {"desired_joint_state"}
+
+
+def test_an_unconnected_command_is_named():
+    system = PlanarBase()
+    context = system.CreateDefaultContext()
+    system.GetInputPort("joint_state").FixValue(context, np.zeros(6))
+    with pytest.raises(PortTypeError, match="base_command"):
+        system.GetOutputPort("desired_joint_state").Eval(context)

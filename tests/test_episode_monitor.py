@@ -1,0 +1,227 @@
+"""The episode monitor on fixed inputs, and on a plant that runs into a wall."""
+
+import math
+
+import numpy as np
+import pytest
+from pydrake.common.value import AbstractValue
+from pydrake.geometry import Box, HalfSpace, Sphere
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import (
+    AddMultibodyPlantSceneGraph,
+    ContactResults,
+    CoulombFriction,
+)
+from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
+from pydrake.systems.analysis import Simulator, SimulatorStatus
+from pydrake.systems.framework import DiagramBuilder
+
+from unilavira_drake.episode_monitor import EpisodeMonitor
+from unilavira_drake.messages import LanguageAction, NavigationStatus, Panorama
+from unilavira_drake.messages.metrics import CAUSES, EpisodeMetrics
+from unilavira_drake.scenario import Budgets
+
+PERIOD = 0.1
+
+
+class Bench:
+    """A monitor whose inputs are set by hand, one tick at a time."""
+
+    def __init__(self, goal_distance=None, **budgets):
+        self.monitor = EpisodeMonitor(
+            period=PERIOD, budgets=Budgets(**budgets), goal_distance=goal_distance
+        )
+        self.simulator = Simulator(self.monitor)
+        self.context = self.simulator.get_mutable_context()
+        self.pose(0.0, 0.0)
+        self.fix("language_action", LanguageAction())
+        self.fix("panorama", Panorama())
+        self.fix("navigation_status", NavigationStatus())
+        self.fix("contact_results", ContactResults())
+        self.status = None
+
+    def fix(self, name, value):
+        self.monitor.GetInputPort(name).FixValue(self.context, AbstractValue.Make(value))
+
+    def pose(self, x, y, yaw=0.0):
+        self.fix("cheat_X_WB", RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, y, 0.0]))
+
+    def tick(self):
+        self.status = self.simulator.AdvanceTo(self.context.get_time() + PERIOD)
+        return self.metrics
+
+    @property
+    def metrics(self):
+        return self.monitor.GetOutputPort("metrics").Eval(self.context)
+
+    @property
+    def terminated(self):
+        return self.status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition
+
+
+def test_the_path_and_the_least_distance_follow_the_true_pose():
+    bench = Bench(goal_distance=lambda x, y: math.hypot(x - 2.0, y))
+    bench.tick()
+    for angle in np.linspace(0.0, math.pi, 101):
+        bench.pose(1 - math.cos(angle), math.sin(angle))
+        bench.tick()
+    bench.tick()
+    metrics = bench.metrics
+    assert metrics.path_length == pytest.approx(math.pi, rel=1e-3)
+    assert metrics.position == pytest.approx((2.0, 0.0), abs=1e-3)
+    bench.pose(3.0, 0.0)
+    bench.tick()
+    bench.tick()
+    assert bench.metrics.goal_distance == pytest.approx(1.0)
+    assert bench.metrics.min_goal_distance == pytest.approx(0.0, abs=1e-2)
+
+
+def test_the_start_is_no_step_and_trembling_adds_nothing():
+    bench = Bench()
+    bench.pose(5.0, 7.0)
+    for k in range(10):
+        bench.pose(5.0 + 0.0004 * (k % 2), 7.0)
+        bench.tick()
+    assert bench.metrics.path_length == 0.0
+    assert bench.metrics.position == pytest.approx((5.0, 7.0), abs=1e-3)
+    assert bench.metrics.goal_distance is None
+
+
+def test_a_stop_is_written_in_one_tick_and_ends_in_the_next():
+    bench = Bench()
+    bench.tick()
+    bench.fix("language_action", LanguageAction(n=4, call="double_check", tool="stop"))
+    while not bench.metrics.ended:
+        bench.tick()
+        assert not bench.terminated
+    assert bench.metrics.cause == "stopped"
+    written = bench.context.get_time()
+    bench.tick()
+    assert bench.terminated
+    assert bench.context.get_time() <= written + PERIOD + 1e-9
+    assert bench.status.message() == "stopped"
+
+
+def test_only_decide_and_recover_are_decisions():
+    bench = Bench(decisions=2)
+    calls = ("plan_todo", "decide", "double_check", "recover", "answer")
+    for n, call in enumerate(calls, start=1):
+        bench.fix("language_action", LanguageAction(n=n, call=call, tool="stay"))
+        bench.tick()
+        bench.tick()
+    assert bench.metrics.decisions == 2
+    assert not bench.metrics.ended
+    bench.fix("language_action", LanguageAction(n=6, call="decide", tool="turn"))
+    bench.tick()
+    bench.tick()
+    assert bench.metrics.cause == "decision_budget"
+
+
+def test_simulated_time_runs_out():
+    bench = Bench(simulated_time=1.0)
+    while not bench.metrics.ended:
+        bench.pose(bench.context.get_time(), 0.0)
+        bench.tick()
+    assert bench.metrics.cause == "time_budget"
+    assert bench.metrics.time == pytest.approx(1.0)
+
+
+NEWS = {
+    "panorama": lambda bench, k: bench.fix("panorama", Panorama(n=k)),
+    "action": lambda bench, k: bench.fix("language_action", LanguageAction(n=k)),
+    "status": lambda bench, k: bench.fix("navigation_status", NavigationStatus(k, "moving")),
+    "state": lambda bench, k: bench.fix(
+        "navigation_status", NavigationStatus(1, ("moving", "failed")[k % 2])
+    ),
+    "motion": lambda bench, k: bench.pose(0.01 * k, 0.0),
+    "turning": lambda bench, k: bench.pose(0.0, 0.0, 0.1 * k),
+}
+
+
+@pytest.mark.parametrize("news", NEWS)
+def test_any_progress_puts_off_the_stall(news):
+    bench = Bench(stall=1.0)
+    for k in range(1, 10):
+        NEWS[news](bench, k)
+        for _ in range(5):
+            bench.tick()
+    assert not bench.metrics.ended
+    for _ in range(12):
+        bench.tick()
+    assert bench.metrics.cause == "stalled"
+
+
+def test_every_cause_has_its_sentence():
+    assert set(CAUSES) >= {"stopped", "decision_budget", "time_budget", "stalled"}
+    assert all(text.endswith(".") for text in CAUSES.values())
+    assert EpisodeMetrics(cause="stopped").ended
+
+
+def watch(build):
+    """Runs a plant that ``build`` fills for 1.5 s under a monitor; returns its metrics."""
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, 0.01)
+    prepare = build(plant)
+    plant.Finalize()
+    monitor = builder.AddSystem(EpisodeMonitor(period=PERIOD, budgets=Budgets()))
+    contacts = plant.get_contact_results_output_port()
+    builder.Connect(contacts, monitor.GetInputPort("contact_results"))
+    diagram = builder.Build()
+    simulator = Simulator(diagram)
+    prepare(plant.GetMyMutableContextFromRoot(simulator.get_mutable_context()))
+    own = monitor.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    for name, value in (
+        ("cheat_X_WB", RigidTransform()),
+        ("language_action", LanguageAction()),
+        ("panorama", Panorama()),
+        ("navigation_status", NavigationStatus()),
+    ):
+        monitor.GetInputPort(name).FixValue(own, AbstractValue.Make(value))
+    simulator.AdvanceTo(1.5)
+    return monitor.GetOutputPort("metrics").Eval(own)
+
+
+def sliding_block(gap):
+    """A block on a rail, pushed towards a wall ``gap`` metres ahead."""
+
+    def build(plant):
+        friction = CoulombFriction(0.5, 0.5)
+        wall = RigidTransform([0.5 + gap + 0.1, 0.0, 0.0])
+        plant.RegisterCollisionGeometry(
+            plant.world_body(), wall, Box(0.2, 4.0, 1.0), "wall", friction
+        )
+        block = plant.AddRigidBody("block", SpatialInertia.SolidBoxWithMass(10.0, 1.0, 1.0, 1.0))
+        plant.RegisterCollisionGeometry(block, RigidTransform(), Box(1, 1, 1), "block", friction)
+        joint = plant.AddJoint(
+            PrismaticJoint("rail", plant.world_frame(), block.body_frame(), [1.0, 0.0, 0.0])
+        )
+        plant.AddJointActuator("push", joint)
+        return lambda context: plant.get_actuation_input_port().FixValue(context, [50.0])
+
+    return build
+
+
+def ball_on_the_floor(plant):
+    friction = CoulombFriction(0.5, 0.5)
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform(), HalfSpace(), "floor", friction
+    )
+    ball = plant.AddRigidBody("ball", SpatialInertia.SolidSphereWithMass(10.0, 0.5))
+    plant.RegisterCollisionGeometry(ball, RigidTransform(), Sphere(0.5), "ball", friction)
+    return lambda context: plant.SetFreeBodyPose(context, ball, RigidTransform([0.0, 0.0, 0.5]))
+
+
+def test_pushing_against_a_wall_is_one_collision():
+    metrics = watch(sliding_block(0.2))
+    assert metrics.collisions == 1
+    assert metrics.max_contact_force > 40.0
+
+
+def test_a_wall_that_is_not_reached_is_none():
+    assert watch(sliding_block(9.0)).collisions == 0
+
+
+def test_standing_on_the_floor_is_none():
+    metrics = watch(ball_on_the_floor)
+    assert metrics.collisions == 0
+    assert metrics.max_contact_force == 0.0

@@ -1,0 +1,145 @@
+"""Lower bounds: a model that chooses at random, and one that goes where it has not been.
+
+Both speak the same replies as every other model and neither reads the task.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import random
+from typing import Any
+
+from unilavira_drake.errors import MllmError
+from unilavira_drake.messages import DIRECTIONS, VIEW_YAW
+from unilavira_drake.mllm.request import (
+    Completion,
+    LanguageVariables,
+    MllmRequest,
+    VisionVariables,
+)
+
+STOP_CHANCE = 0.1
+"""Chance that ``random`` asks to stop, at each decision."""
+FRONTIER_DECISIONS = 12
+"""``frontier`` stops after this many decisions."""
+_LEAST_FREE = 1.0
+_FLOOR_ROW = 0.62
+"""Share of the image height at which floor a few metres ahead is looked for."""
+
+
+class RandomModel:
+    """Goes to a random point of a random view; stops by chance, never looks where it is."""
+
+    name = "random"
+    perception = "images"
+    reasoning = "rules"
+    description = "random choices: a lower bound, not a model"
+
+    def complete(self, request: MllmRequest) -> Completion:
+        """Answers a request; equal requests get equal replies.
+
+        Raises:
+            MllmError: if the call is unknown.
+        """
+        generator = _generator(request)
+        variables = request.variables
+        if isinstance(variables, VisionVariables):
+            u = generator.uniform(0.1, 0.9) * variables.width
+            v = generator.uniform(0.55, 0.95) * variables.height
+            return _completion(_point(u, v, "a random point"))
+        if request.call in ("decide", "recover"):
+            if generator.random() < STOP_CHANCE:
+                return _completion(_action({"tool": "double_check"}, "a random stop"))
+            direction = generator.choice(DIRECTIONS)
+            action = {"tool": "turn", "direction": direction}
+            return _completion(_action(action, "a random direction"))
+        return _completion(_fixed_reply(request.call, self.name))
+
+
+class FrontierModel:
+    """Goes where there is free floor and no visited place; stops after a fixed count."""
+
+    name = "frontier"
+    perception = "images"
+    reasoning = "rules"
+    description = "goes to unvisited free floor and never reads the task: a lower bound"
+
+    def complete(self, request: MllmRequest) -> Completion:
+        """Answers a request; equal requests get equal replies.
+
+        Raises:
+            MllmError: if the call is unknown.
+        """
+        variables = request.variables
+        if isinstance(variables, VisionVariables):
+            u, v = variables.width / 2.0, _FLOOR_ROW * variables.height
+            return _completion(_point(u, v, "floor ahead"))
+        if request.call in ("decide", "recover"):
+            if request.n > FRONTIER_DECISIONS:
+                return _completion(_action({"tool": "double_check"}, "enough was seen"))
+            direction = _frontier(variables, _generator(request))
+            action = {"tool": "turn", "direction": direction}
+            return _completion(_action(action, "free floor not visited yet"))
+        return _completion(_fixed_reply(request.call, self.name))
+
+
+def _frontier(variables: LanguageVariables, generator: random.Random) -> str:
+    """Returns the direction with the most free floor, less what lies near visited places."""
+    scores = []
+    for view in variables.views:
+        if view.free_distance < _LEAST_FREE:
+            continue
+        bearing = math.degrees(VIEW_YAW[view.direction])
+        visits = sum(
+            abs(math.remainder(w.bearing - bearing, 360.0)) < 45.0
+            and w.distance < view.free_distance + 1.0
+            for w in variables.waypoints
+            if w.id != variables.current_waypoint
+        )
+        here = (w for w in variables.waypoints if w.id == variables.current_waypoint)
+        tried = sum(text.startswith(view.direction) for w in here for text in w.tried)
+        score = min(view.free_distance, 5.0) - 3.0 * visits - 4.0 * tried
+        scores.append((score, generator.random(), view.direction))
+    return max(scores)[2] if scores else generator.choice(DIRECTIONS)
+
+
+def _generator(request: MllmRequest) -> random.Random:
+    key = f"{request.seed}/{request.role}/{request.n}/{request.attempt}".encode()
+    return random.Random(int.from_bytes(hashlib.sha256(key).digest()[:8], "big"))
+
+
+def _completion(reply: dict[str, Any]) -> Completion:
+    return Completion(text=json.dumps(reply))
+
+
+def _point(u: float, v: float, target: str) -> dict[str, Any]:
+    return {
+        "target_desc": target,
+        "box": None,
+        "point": [u, v],
+        "confidence": None,
+        "reason": "chosen without looking at the picture",
+    }
+
+
+def _action(action: dict[str, Any], why: str) -> dict[str, Any]:
+    return {
+        "progress_analysis": "not judged",
+        "reasoning_todo": "the task is not read",
+        "todo_updates": [],
+        "reasoning_action": why,
+        "action": action,
+        "scene": "",
+    }
+
+
+def _fixed_reply(call: str, name: str) -> dict[str, Any]:
+    if call == "plan_todo":
+        return {"reasoning": f"{name} does not read the task", "todo": ["Move through the place"]}
+    if call == "double_check":
+        return {"reasoning": f"{name} does not check", "confirmed": True, "reason": ""}
+    if call == "answer":
+        return {"reasoning": f"{name} does not read the question", "answer": "unknown"}
+    raise MllmError(f"{name}: unknown call {call!r}.")
