@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import functools
 import json
 import math
 import tempfile
@@ -42,7 +41,7 @@ from unilavira_drake.robots.ground_controller import GroundTrackingController
 from unilavira_drake.robots.planar_base import PlanarBase
 from unilavira_drake.station import add_navigation_station
 
-CHUNK = 0.1
+CHUNK = 0.5
 """Simulated seconds in which the robot either moved or did not."""
 
 PARTS = {
@@ -72,29 +71,34 @@ class Meter:
         self._inside: list[float] = []
 
     def metered(self, category: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Returns the function, metered on its own thread."""
+        """Returns the function, metered."""
+        return self.metered_by(lambda _: category, function)
 
-        @functools.wraps(function)
-        def call(*args: Any, **kwargs: Any) -> Any:
-            with self.span(category):
-                return function(*args, **kwargs)
+    def metered_by(
+        self, category: Callable[[Any], str], function: Callable[..., Any]
+    ) -> Callable[..., Any]:
+        """Returns the method, metered under a category that is told by its object.
+
+        Rendering also counts the helper threads that a software renderer has.
+        """
+        inside, thread_time = self._inside, time.thread_time
+
+        def call(owner: Any, *args: Any) -> Any:
+            name = category(owner)
+            whole = time.process_time() if name == "rendering" else 0.0
+            inside.append(0.0)
+            start = thread_time()
+            try:
+                return function(owner, *args)
+            finally:
+                took = thread_time() - start
+                nested = inside.pop()
+                if inside:
+                    inside[-1] += took
+                all_threads = name == "rendering"
+                self.seconds[name] += time.process_time() - whole if all_threads else took - nested
 
         return call
-
-    @contextlib.contextmanager
-    def span(self, category: str, *, all_threads: bool = False) -> Iterator[None]:
-        """Meters a block; ``all_threads`` also counts helpers, as the software renderer has."""
-        whole, start = time.process_time(), time.thread_time()
-        self._inside.append(0.0)
-        try:
-            yield
-        finally:
-            took = time.thread_time() - start
-            nested = self._inside.pop()
-            if self._inside:
-                self._inside[-1] += took
-            spent = time.process_time() - whole if all_threads else took - nested
-            self.seconds[category] += spent
 
 
 class MeteredModel:
@@ -108,6 +112,7 @@ class MeteredModel:
         return getattr(self._backend, name)
 
     def complete(self, request: Any) -> Any:
+        """Calls the model, metered."""
         start = time.thread_time()
         try:
             return self._backend.complete(request)
@@ -121,9 +126,7 @@ def metering(meter: Meter, *, systems: bool) -> Iterator[None]:
     reader_init, broker_init = InputReader.__init__, Broker.__init__
 
     class MeteredImageReader(InputReader[Any]):
-        def __call__(self, context: Any) -> Any:
-            with meter.span("rendering", all_threads=True):
-                return super().__call__(context)
+        __call__ = meter.metered("rendering", InputReader.__call__)
 
     def init_reader(self: Any, system: Any, name: str, *args: Any) -> None:
         reader_init(self, system, name, *args)
@@ -133,18 +136,15 @@ def metering(meter: Meter, *, systems: bool) -> Iterator[None]:
     def init_broker(self: Any, backend: Any, **options: Any) -> None:
         broker_init(self, MeteredModel(backend, meter), **options)
 
-    tick = Level._tick
-
-    def metered_tick(self: Any, context: Any, state: Any) -> Any:
-        with meter.span(PARTS.get(type(self).__name__, "agent")):
-            return tick(self, context, state)
+    def part(level: Any) -> str:
+        return PARTS.get(type(level).__name__, "agent")
 
     with contextlib.ExitStack() as stack:
         patch = stack.enter_context
         patch(mock.patch.object(InputReader, "__init__", init_reader))
         patch(mock.patch.object(Broker, "__init__", init_broker))
         if systems:
-            patch(mock.patch.object(Level, "_tick", metered_tick))
+            patch(mock.patch.object(Level, "_tick", meter.metered_by(part, Level._tick)))
             for owner, name, category in CALLBACKS:
                 own = meter.metered(category, getattr(owner, name))
                 patch(mock.patch.object(owner, name, own))

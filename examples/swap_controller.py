@@ -24,9 +24,9 @@ class TurnThenDrive(LeafSystem):
         self.DeclareAbstractInputPort("sweep", AbstractValue.Make(Sweep()))
         self.DeclareAbstractInputPort("pose_estimate", Value[RigidTransform]())
         self.DeclareVectorInputPort("twist", 6)
-        self.DeclareDiscreteState(4)
+        command = self.DeclareDiscreteState(4)
         self.DeclarePeriodicDiscreteUpdateEvent(0.05, 0.0, self.update)
-        self.DeclareStateOutputPort("desired_command", 0)
+        self.DeclareStateOutputPort("desired_command", command)
 
     def update(self, context, state):
         path, sweep = (self.GetInputPort(name).Eval(context) for name in ("path", "sweep"))

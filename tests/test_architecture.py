@@ -67,9 +67,7 @@ def test_imports_point_upward_only(path: Path) -> None:
         return
     assert part(path) in LAYER, f"{part(path)}: give it a layer"
     wrong = {
-        name
-        for name in own_imports(path)
-        if LAYER.get(name.split(".")[0], 0) > LAYER[part(path)]
+        name for name in own_imports(path) if LAYER.get(name.split(".")[0], 0) > LAYER[part(path)]
     }
     assert not wrong
 

@@ -184,7 +184,7 @@ def test_the_base_follows_its_command():
     rig.drive(0.5, 0.5, 0.0, 0.0)
     x, _, _ = rig.drive(0.0, 0.5, 0.0, 0.0)
     x_end, y, yaw = rig.drive(2.0, 0.5, 0.3, 0.0)
-    assert x_end - x == pytest.approx(1.0, abs=0.01)
+    assert x_end - x == pytest.approx(1.0, abs=0.02)
     assert (y, yaw) == pytest.approx((5.0, 0.0), abs=1e-6)
     assert rig.read("twist") == pytest.approx([0, 0, 0, 0.5, 0, 0], abs=1e-3)
     rig.drive(0.5, 0.0, 0.0, 0.8)

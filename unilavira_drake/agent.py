@@ -20,9 +20,6 @@ from unilavira_drake.scenario import MemoryConfig
 from unilavira_drake.vision.system import Vision
 from unilavira_drake.wiring import Wiring
 
-ABLATIONS = ("full", "no_tdm", "no_scb", "no_both")
-
-
 @dataclass(frozen=True)
 class ModelChoice:
     """A model and how long it thinks."""

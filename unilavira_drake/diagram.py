@@ -50,7 +50,8 @@ def make_navigation_diagram(
             simulator's labels.
         goal_distance: geodesic metres from a floor point (x, y) to the goal, for the monitor;
             None when the episode is not scored.
-        on_message: called with (time, system, event, message) for each new message.
+        on_message: called at every tick with (time, system, event, message) for each message
+            on a port; a ``recording.message_log.MessageLog`` passes the new ones on.
 
     Raises:
         InputError: if the scenario names something that does not exist.
@@ -101,6 +102,7 @@ def make_navigation_diagram(
             mapping=scenario.mapping,
             planning=scenario.planning,
             tick=scenario.tick,
+            time_step=scenario.plant.time_step,
             replace=own,
         ),
     )

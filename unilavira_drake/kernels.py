@@ -14,6 +14,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+# Some releases of numba carry types and some do not; the functions keep their own here.
+_njit: Any = numba.njit
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -33,9 +36,9 @@ def inlined_kernel(function: F) -> F:
 
 def _compiled(function: F, **options: bool) -> F:
     try:
-        return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function))
+        return cast(F, _njit(cache=True, nogil=True, error_model="numpy", **options)(function))
     except RuntimeError:
-        return cast(F, numba.njit(nogil=True, error_model="numpy", **options)(function))
+        return cast(F, _njit(nogil=True, error_model="numpy", **options)(function))
 
 
 def frozen_view(array: NDArray[Any], dtype: type[np.generic]) -> NDArray[Any]:

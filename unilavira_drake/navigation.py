@@ -11,7 +11,7 @@ from unilavira_drake.mapping.system import OccupancyMapper
 from unilavira_drake.messages import Intrinsics
 from unilavira_drake.planning.system import FastMarchingPlanner
 from unilavira_drake.robots.cobot_magic import CobotMagic
-from unilavira_drake.robots.drive_limits import DriveLimits
+from unilavira_drake.robots.drive_limits import DriveLimits, Reaction
 from unilavira_drake.robots.governor import Governor
 from unilavira_drake.robots.ground_controller import GroundTrackingController
 from unilavira_drake.robots.stopping import Footprint
@@ -26,6 +26,7 @@ def make_navigation(
     mapping: MappingConfig,
     planning: PlanningConfig,
     tick: float,
+    time_step: float,
     replace: MutableMapping[str, System] | None = None,
 ) -> Diagram:
     """Returns the deterministic half of Robot Action (paper III-B.3) for a ground robot."""
@@ -39,8 +40,12 @@ def make_navigation(
         period=robot.control_period,
     )
     footprint = Footprint(half_length=robot.length / 2, half_width=robot.width / 2)
-    wiring.add("controller", lambda: GroundTrackingController(limits=limits))
-    wiring.add("governor", lambda: Governor(limits=limits, footprint=footprint))
+    # A command reaches the wheels in the plant's next step and shows in the one after.
+    reaction = Reaction(delay=2.0 * time_step)
+    wiring.add("controller", lambda: GroundTrackingController(limits=limits, reaction=reaction))
+    wiring.add(
+        "governor", lambda: Governor(limits=limits, footprint=footprint, offset=time_step)
+    )
     wiring.connect("mapper", "map", "planner")
     wiring.connect("mapper", "map", "governor")
     wiring.connect("planner", "path", "controller")

@@ -52,12 +52,16 @@ class InputReader(Generic[T]):
         Raises:
             PortTypeError: if nothing is connected, or the value has another type.
         """
-        if not self._port.HasValue(context):
+        try:
+            value = self._port.Eval(context)
+        except (RuntimeError, ValueError):
+            # Asked only now: HasValue costs as much as Eval, a thousand times a second.
+            if self._port.HasValue(context):
+                raise
             raise PortTypeError(
                 f"{self._system.GetSystemPathname()}: input port {self._name!r} is not connected; "
                 f"connect an output that carries {self._type.__name__}."
-            )
-        value = self._port.Eval(context)
+            ) from None
         if not isinstance(value, self._type):
             raise PortTypeError(
                 f"{self._system.GetSystemPathname()}: input port {self._name!r} expects "
@@ -67,7 +71,12 @@ class InputReader(Generic[T]):
 
     def optional(self, context: Context) -> T | None:
         """Returns the value on the port, or None when nothing is connected."""
-        return self(context) if self._port.HasValue(context) else None
+        try:
+            return self(context)
+        except PortTypeError:
+            if self._port.HasValue(context):
+                raise
+            return None
 
 
 def message_input(system: LeafSystem, name: str, default: T) -> InputReader[T]:
@@ -100,12 +109,15 @@ class VectorReader:
         Raises:
             PortTypeError: if nothing is connected.
         """
-        if not self._port.HasValue(context):
+        try:
+            value: NDArray[np.float64] = self._port.Eval(context)
+        except (RuntimeError, ValueError):
+            if self._port.HasValue(context):
+                raise
             raise PortTypeError(
                 f"{self._system.GetSystemPathname()}: input port {self._name!r} is not connected; "
                 f"connect a vector of size {self._size}."
-            )
-        value: NDArray[np.float64] = self._port.Eval(context)
+            ) from None
         return value
 
 

@@ -146,6 +146,6 @@ class Scenario:
     memory: MemoryConfig = dc.field(default_factory=MemoryConfig)
     plant: MultibodyPlantConfig = dc.field(
         default_factory=lambda: MultibodyPlantConfig(
-            time_step=0.01, discrete_contact_approximation="lagged"
+            time_step=0.025, discrete_contact_approximation="lagged"
         )
     )

@@ -119,13 +119,20 @@ def _find(name_or_file: str) -> Path:
 def _merged(text: str, name: str, defaults: Scenario) -> Scenario:
     try:
         source = Source(name, text, numbered=name != "overlay")
-        data = yaml_load_data(text)
+        data = yaml_load_data(text, private=True)
     except yaml.YAMLError as error:
         raise ScenarioError(f"{name}: not valid YAML: {_first_line(error)}.") from None
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{name}: a value cannot be read: {_first_line(error)}.") from None
     if data is None:
         return defaults
+    if isinstance(data, dict):
+        # Drake's rule: such keys at the top hold templates for anchors.
+        data = {
+            key: value
+            for key, value in data.items()
+            if key == "_tag" or not str(key).startswith("_")
+        }
     check_fields(data, Scenario, source)
     try:
         merged: Scenario = yaml_load_typed(

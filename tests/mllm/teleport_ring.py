@@ -78,7 +78,12 @@ class Home:
         start = int(np.argmin(np.hypot(*(self.points - pose[:2]).T) + 9.0 * (self.room < RADIUS)))
         reach, back = dijkstra(self.graph, indices=start, return_predecessors=True)
         off = np.hypot(*(self.points - np.array(goal)).T)
+        # A camera sees no floor behind a wall, so no goal moves into another room than the seen.
+        room = self.world.room_at(*goal)
         allowed = np.isfinite(reach) & (off <= snap)
+        if room is not None:
+            allowed &= (self.points >= room.rectangle[:2]).all(axis=1)
+            allowed &= (self.points <= room.rectangle[2:]).all(axis=1)
         if not allowed.any():
             return None
         roomy = allowed & (self.room >= ROOMY) & (off <= off[allowed].min() + 0.3)

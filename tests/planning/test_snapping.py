@@ -62,9 +62,10 @@ def test_a_thing_is_approached_from_the_side_that_was_seen():
 
 def test_the_seen_side_is_kept_when_the_other_side_is_nearer():
     wall = (2.9, 0.0, 3.0, 4.0 - 1.2)
-    clutter = (2.0, 0.5, 2.8, 1.5)
-    _, _, center = snapped(room((wall, clutter)), (2.9, 1.0), (1.0, 2.5))
+    clutter = (2.0, 0.4, 2.7, 1.2)
+    _, _, center = snapped(room((wall, clutter)), (2.9, 1.0), (2.2, 3.0))
     assert center[0] < 2.9
+    assert math.dist(center, (2.9, 1.0)) > 0.7  # across the wall it would be 0.5 m
 
 
 def test_room_to_turn_is_preferred_and_a_narrow_place_is_taken():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from unilavira_drake.errors import PortTypeError
-from unilavira_drake.robots.planar_base import PlanarBase, planar_pose, world_velocity
+from unilavira_drake.robots.planar_base import PlanarBase, planar_pose
 
 SPEED = st.floats(-2, 2)
 ANGLE = st.floats(-7, 7)
@@ -24,7 +24,8 @@ def evaluate(system, port, command=(0.0, 0.0, 0.0), state=(0.0,) * 6):
 @given(vx=SPEED, vy=SPEED, wz=SPEED, yaw=ANGLE)
 def test_twist_of_the_desired_motion_is_the_command(vx, vy, wz, yaw):
     for holonomic in (True, False):
-        velocity = world_velocity(np.array([vx, vy, wz]), yaw, holonomic=holonomic)
+        base, state = PlanarBase(holonomic=holonomic), (1.0, 2.0, yaw, 0.0, 0.0, 0.0)
+        velocity = evaluate(base, "desired_joint_state", (vx, vy, wz), state)[3:]
         twist = evaluate(PlanarBase(), "twist", state=(1.0, 2.0, yaw, *velocity))
         expected = [0, 0, wz, vx, vy if holonomic else 0.0, 0]
         assert twist == pytest.approx(expected, abs=1e-12)

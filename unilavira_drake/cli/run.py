@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -46,8 +48,8 @@ def run(
     ablation: Annotated[
         str | None, _option("Memory to leave out.", "full|no_tdm|no_scb|no_both")
     ] = None,
-    seed: Annotated[int | None, _option("Seed of everything random.", "N")] = None,
-    max_decisions: Annotated[int | None, _option("Ends the episode.", "N")] = None,
+    seed: Annotated[str | None, _option("Seed of everything random.", "N")] = None,
+    max_decisions: Annotated[str | None, _option("Ends the episode.", "N")] = None,
     renderer: Annotated[str | None, _option("Renderer of the cameras.", "vtk")] = None,
     setting: Annotated[
         list[str] | None,
@@ -80,7 +82,18 @@ def run(
     }
     loaded = load_scenario(scenario, _overlay(flags, setting or []))
     check_rendering()
-    run_watched(loaded, fresh_folder("runs", _run_name(scenario, loaded)) if out is None else out)
+    if out is not None:
+        run_watched(loaded, out)
+        return
+    folder = fresh_folder("runs", _run_name(scenario, loaded))
+    try:
+        run_watched(loaded, folder)
+    except InputError:
+        # Nothing was run: leave nothing behind.
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+            folder.parent.rmdir()
+        raise
 
 
 def run_watched(scenario: Scenario, out: Path) -> None:
@@ -105,7 +118,7 @@ def run_watched(scenario: Scenario, out: Path) -> None:
         raise typer.Exit(INTERRUPTED)
 
 
-def _overlay(flags: dict[str, str | int | bool | None], settings: list[str]) -> str:
+def _overlay(flags: Mapping[str, str | bool | None], settings: list[str]) -> str:
     # JSON is YAML, with text safely in quotes.
     sugar = [
         f"{key}={json.dumps(value, ensure_ascii=False)}"

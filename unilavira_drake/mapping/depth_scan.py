@@ -9,6 +9,7 @@ cell is missed or visited twice, however near or far it is.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +145,7 @@ def apply(
     for i in range(hits.shape[0]):
         dy = (grid[3] + i + 0.5) * resolution - camera[5]
         for j in range(hits.shape[1]):
-            old = np.int64(log_odds[corner[0] + i, corner[1] + j])
+            old: Any = np.int64(log_odds[corner[0] + i, corner[1] + j])
             if hits[i, j] >= MIN_HITS:
                 new = min(old + HIT_STEP, LIMIT)
                 log_odds[corner[0] + i, corner[1] + j] = new if new != 0 else 1

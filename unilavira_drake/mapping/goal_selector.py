@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
@@ -111,7 +113,11 @@ class GoalSelector(LeafSystem):
 
     def __init__(self, *, max_range: float = 10.0) -> None:
         super().__init__()
-        self._max_range = max_range
+        # Drake invalidates a calculation whenever any level's state is written, ten times a
+        # second; the projection is done once for the same four messages.
+        self._select = functools.lru_cache(maxsize=2)(
+            functools.partial(select_goal, max_range=max_range)
+        )
         self._vision = message_input(self, "vision_action", VisionAction())
         self._action = message_input(self, "language_action", LanguageAction())
         self._history = message_input(self, "history", History())
@@ -126,11 +132,10 @@ class GoalSelector(LeafSystem):
         )
 
     def _calc_goal(self, context: Context, output: AbstractValue) -> None:
-        goal = select_goal(
+        goal = self._select(
             self._action(context),
             self._vision(context),
             self._history(context),
             self._panorama(context),
-            max_range=self._max_range,
         )
         output.set_value(goal)

@@ -114,7 +114,8 @@ class OccupancyMapper(Level):
             return state
         image = self._depth_image(context)
         X_WC = (X_WB @ self._X_BC(context)).GetAsMatrix4()
-        depth: NDArray[np.float32] = image.data[:, :, 0]
+        pixels: Any = image.data
+        depth: NDArray[np.float32] = pixels[:, :, 0]
         floor_height = float(X_WB.translation()[2]) - self._base_height
         views = (DepthView(depth, self._intrinsics, X_WC),)
         return self._integrated(context, state, X_WB, views, state.occupancy.n, floor_height)

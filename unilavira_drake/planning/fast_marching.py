@@ -9,6 +9,7 @@ again, so the result is the same discrete solution as with a heap.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ def distance_field(
 
 
 @inlined_kernel
-def _update(times: NDArray[np.float32], i: int, width: int, cost: np.float32) -> np.float32:
+def _update(times: NDArray[np.float32], i: int, width: int, cost: np.float32) -> Any:
     """Returns the upwind solution at one cell from its four neighbours."""
     a = min(times[i - 1], times[i + 1])
     b = min(times[i - width], times[i + width])
@@ -128,7 +129,7 @@ def _relax(
     cost: NDArray[np.float32],
     width: int,
     times: NDArray[np.float32],
-    i: int,
+    i: Any,
     current: int,
     queue: NDArray[np.int32],
     count: NDArray[np.int64],
@@ -144,7 +145,7 @@ def _relax(
         if new >= old:
             continue
         times[j] = new
-        bucket = max(np.int64(new * _PER_CELL), current)
+        bucket: Any = max(np.int64(new * _PER_CELL), np.int64(current))
         # Queued under the same bucket already, which is still to come.
         if bucket != current and old < np.inf and np.int64(old * _PER_CELL) == bucket:
             continue

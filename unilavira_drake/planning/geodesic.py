@@ -102,7 +102,8 @@ class GeodesicField(Message):
             np.ones(self.times.shape, np.float32),
             self.space.point(x, y),
         )
-        return cells * self.space.resolution + np.array(self.space.origin)
+        points: NDArray[np.float64] = cells * self.space.resolution + self.space.origin
+        return points
 
     def distance(self, x: float, y: float) -> float:
         """Returns the length of the shortest path from a world point, metres; inf without one.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -56,7 +57,7 @@ class NavigationGrid:
     def contains(self, cell: tuple[int, int]) -> bool:
         """Whether a cell lies in the window."""
         rows, columns = self.blocked.shape
-        return 0 <= cell[0] < rows and 0 <= cell[1] < columns
+        return bool(0 <= cell[0] < rows and 0 <= cell[1] < columns)
 
     def center(self, cell: tuple[int, int]) -> tuple[float, float]:
         """Returns the world (x, y) of a cell's centre, metres."""
@@ -95,7 +96,7 @@ def make_navigation_grid(
         turning_radius: radius it sweeps when it turns in place, metres.
     """
     log_odds, origin = _window(occupancy, [position, *targets])
-    distance = cv2.distanceTransform(
+    distance: Any = cv2.distanceTransform(
         (log_odds <= 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
     )
     clearance = np.empty(log_odds.shape, np.float32)

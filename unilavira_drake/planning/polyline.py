@@ -100,18 +100,19 @@ def segment_cost(
     step_x, step_y = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
     t_x = ((column + (dx > 0.0)) - x0) / dx if dx != 0.0 else np.inf
     t_y = ((row + (dy > 0.0)) - y0) / dy if dy != 0.0 else np.inf
-    cost, t = 0.0, 0.0
+    cost: float = 0.0
+    t = 0.0
     while True:
         if blocked[row, column]:
-            return np.inf
+            return math.inf
         t_next = min(t_x, t_y, 1.0)
-        cost += slowness[row, column] * (t_next - t) * total
+        cost += float(slowness[row, column]) * (t_next - t) * total
         t = t_next
         if t >= 1.0:
             return cost
         if abs(t_x - t_y) < 1e-9:
             if blocked[row + step_y, column] or blocked[row, column + step_x]:
-                return np.inf
+                return math.inf
             row, column = row + step_y, column + step_x
             t_x, t_y = t_x + abs(1.0 / dx), t_y + abs(1.0 / dy)
         elif t_x < t_y:

@@ -60,7 +60,8 @@ def map_picture(
     _draw_world(axes, world)
     _draw_way(axes, trace)
     _draw_places(axes, trace, goals)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=7, frameon=False)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=7, frameon=False)
     stream = io.BytesIO()
     figure.savefig(stream, format="png", bbox_inches="tight", metadata={"Software": None})
     return stream.getvalue()

@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, LeafSystem
@@ -57,10 +56,12 @@ class PlanarBase(LeafSystem):
         )
 
     def _calc_desired(self, context: Any, output: Any) -> None:
-        command = self._command(context)
+        vx, vy, wz = self._command(context).tolist()
         yaw = float(self._joint_state(context)[2])
-        velocity = world_velocity(command, yaw, holonomic=self._holonomic)
-        output.SetFromVector(np.concatenate((np.zeros(3), velocity)))
+        if not self._holonomic:
+            vy = 0.0
+        c, s = math.cos(yaw), math.sin(yaw)
+        output.SetFromVector([0.0, 0.0, 0.0, c * vx - s * vy, s * vx + c * vy, wz])
 
     def _calc_pose(self, context: Any, output: Any) -> None:
         x, y, yaw = self._joint_state(context)[:3]
@@ -70,16 +71,6 @@ class PlanarBase(LeafSystem):
         _, _, yaw, vx, vy, wz = self._joint_state(context)
         c, s = math.cos(yaw), math.sin(yaw)
         output.SetFromVector([0.0, 0.0, wz, c * vx + s * vy, c * vy - s * vx, 0.0])
-
-
-def world_velocity(
-    command: NDArray[np.float64], yaw: float, *, holonomic: bool
-) -> NDArray[np.float64]:
-    """Returns the (3,) joint velocities [x', y', yaw'] in the world of a body twist."""
-    vx, vy, wz = command
-    sideways = vy if holonomic else 0.0
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.array([c * vx - s * sideways, s * vx + c * sideways, wz])
 
 
 def planar_pose(x: float, y: float, yaw: float) -> RigidTransform:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from unilavira_drake.mllm.rules.aim import Aim, aim_of, in_sector
 from unilavira_drake.mllm.rules.clauses import describe
 from unilavira_drake.mllm.rules.lexicon import unused_words
 from unilavira_drake.mllm.rules.memory import (
@@ -15,7 +16,8 @@ from unilavira_drake.mllm.rules.memory import (
     remembers,
     scene_sentence,
 )
-from unilavira_drake.mllm.rules.options import Aim, Option, aim_of, in_sector, options
+from unilavira_drake.mllm.rules.option import Option
+from unilavira_drake.mllm.rules.options import options
 from unilavira_drake.mllm.rules.plan import Step
 from unilavira_drake.mllm.rules.progress import Progress, review
 from unilavira_drake.mllm.rules.situation import Situation
@@ -37,7 +39,9 @@ def decide(situation: Situation) -> dict[str, Any]:
         "action": {"tool": "double_check"},
         "scene": _scene(situation),
     }
-    if not progress.pending:
+    if all(step.clause.kind in ("turn", "straight") for step in progress.pending):
+        # All views are in sight anyway: a turn that nothing follows moves nothing.
+        updates += [{"op": "remove", "index": step.index} for step in progress.pending]
         reply["reasoning_action"] = "Every step is done and the target is here: check and stop."
         return _without_list(reply, situation)
     reopened = [s for s in progress.pending if _was_done(s, situation)]
@@ -111,7 +115,8 @@ def _way_back(situation: Situation, aim: Aim, ranked: list[Option]) -> Place | N
     offers = [p for p in situation.places if p.offered and p.id != variables.current_waypoint]
     costs = []
     for place in offers:
-        cost = _RETURN + 0.3 * place.distance
+        before = sum(f"backtrack {place.id}:" in note.text for note in variables.decisions)
+        cost = _RETURN + 0.3 * place.distance + 3.0 * before
         if goal is not None and goal.category and remembers(place, goal) and not place.tried:
             cost -= 10.0
         elif (

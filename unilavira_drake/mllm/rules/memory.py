@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Sequence
@@ -96,8 +97,10 @@ def explored(kind: str, position: tuple[float, float], places: Sequence[Place]) 
         if kind and place.room == kind and math.dist(place.position, position) < 3.5:
             return True
     return any(
-        a.room != b.room and _off_leg(position, a.position, b.position) < 0.7
-        for a, b in zip(places, places[1:], strict=False)
+        a.room != b.room
+        and (not kind or kind in (a.room, b.room))
+        and _off_leg(position, a.position, b.position) < (0.7 if kind else 0.5)
+        for a, b in itertools.pairwise(places)
     )
 
 

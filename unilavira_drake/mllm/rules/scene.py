@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,8 +11,13 @@ from unilavira_drake.mllm.evidence import Detection, ViewEvidence
 from unilavira_drake.mllm.request import ViewNote
 from unilavira_drake.mllm.rules.clauses import Clause
 from unilavira_drake.mllm.rules.floor_camera import FloorCamera
-from unilavira_drake.mllm.rules.vocabulary import class_match, color_name, room_kind, thing_class
-
+from unilavira_drake.mllm.rules.vocabulary import (
+    HUBS,
+    class_match,
+    color_name,
+    room_kind,
+    thing_class,
+)
 
 _AT_HAND = 1.2
 """Metres."""
@@ -33,6 +37,8 @@ class Sight:
     distance: float
     near: float
     """Distance to its nearest visible part on the floor, metres."""
+    far: float
+    """Distance to the farthest floor in view, for floors; metres."""
     pixels: int
     detection: Detection
 
@@ -103,7 +109,7 @@ def look(views: Sequence[ViewEvidence], notes: Sequence[ViewNote]) -> Scene:
         room_id=room_id or (sights[0].id if sights else ""),
         things=things,
         floors=floors,
-        exits=_exits(doors, floors, room),
+        exits=_exits(doors, floors, room, views),
         free={note.direction: note.free_distance for note in notes},
     )
 
@@ -125,6 +131,7 @@ def _sight(detection: Detection, view: ViewEvidence, camera: FloorCamera) -> Sig
         bearing=math.remainder(bearing, 360.0),
         distance=distance,
         near=min(distance, foot),
+        far=min(camera.reach(u, detection.box[1] + 1.0), 10.0) if is_floor else distance,
         pixels=detection.pixels,
         detection=detection,
     )
@@ -159,9 +166,19 @@ def _underfoot(
     return room, largest[room].id
 
 
-def _exits(doors: Sequence[Sight], floors: Sequence[Sight], room: str) -> tuple[Exit, ...]:
-    exits = [_door_exit(door, floors, room) for door in doors if not _behind(door, doors)]
-    exits = _distinct(exits)
+def _exits(
+    doors: Sequence[Sight],
+    floors: Sequence[Sight],
+    room: str,
+    views: Sequence[ViewEvidence],
+) -> tuple[Exit, ...]:
+    # In a corridor doors stand in a row; from a room, what lies past its own door is another's.
+    own = [
+        door
+        for door in doors
+        if not _behind(door, doors) and (room in HUBS or not _past_threshold(door, doors))
+    ]
+    exits = _distinct([_door_exit(door, floors, room) for door in own], views)
     for floor in sorted(floors, key=lambda f: f.distance):
         framed = any(_inside(floor, door) for door in doors)
         if floor.room == room or framed or _known(floor, exits):
@@ -206,24 +223,39 @@ def _door_exit(door: Sight, floors: Sequence[Sight], room: str) -> Exit:
     return Exit(nearest.room, door, nearest)
 
 
-def _distinct(exits: list[Exit]) -> list[Exit]:
-    """Keeps one exit where the same door is seen at the edges of two views."""
+def _distinct(exits: list[Exit], views: Sequence[ViewEvidence]) -> list[Exit]:
+    """Keeps one exit where the same door is seen at the edges of two views.
+
+    A frame cut by the edge of an image is misplaced by up to its width.
+    """
+    width = {view.direction: view.width for view in views}
     kept: list[Exit] = []
     for candidate in sorted(exits, key=lambda e: (not e.kind, -e.sight.pixels)):
-        twin = next(
-            (
-                k
-                for k in kept
-                if math.dist(k.sight.position, candidate.sight.position) < 0.9
-                and k.sight.direction != candidate.sight.direction
-            ),
-            None,
-        )
+        twin = next((k for k in kept if _same_door(k, candidate, width)), None)
         if twin is None:
             kept.append(candidate)
-        elif twin.sight.pixels < candidate.sight.pixels and not twin.kind:
-            kept[kept.index(twin)] = dataclasses.replace(twin, sight=candidate.sight)
     return kept
+
+
+def _same_door(a: Exit, b: Exit, width: dict[str, int]) -> bool:
+    if a.sight.direction == b.sight.direction or (a.kind and b.kind and a.kind != b.kind):
+        return False
+    cut = any(
+        e.sight.detection.box[0] <= 2 or e.sight.detection.box[2] >= width[e.sight.direction] - 2
+        for e in (a, b)
+    )
+    apart = math.dist(a.sight.position, b.sight.position)
+    return apart < (1.4 if cut and angle_between(a.sight.bearing, b.sight.bearing) < 60 else 0.9)
+
+
+def _past_threshold(door: Sight, doors: Sequence[Sight]) -> bool:
+    """Whether a door is seen through one at hand whose frame does not fit into the view."""
+    return any(
+        other.distance < _AT_HAND
+        and other.distance < door.distance - 1.0
+        and angle_between(other.bearing, door.bearing) < 40.0
+        for other in doors
+    )
 
 
 def _known(floor: Sight, exits: Sequence[Exit]) -> bool:

@@ -14,6 +14,10 @@ from unilavira_drake.mllm.rules.scene import Scene, Sight, look
 
 REACH = 1.3
 """A thing whose nearest visible part is this close counts as reached, metres."""
+REACH_FROM_DOOR = 0.7
+"""The same in a door, where the thing may stand in the other room, metres."""
+THRESHOLD = 0.8
+"""A door this close is one that the robot stands in or at, metres."""
 APPROACHED = 2.0
 """The same, where an approach to the thing itself has just ended without an error, metres."""
 
@@ -64,11 +68,17 @@ class Situation:
         """The steps still to be done, in order."""
         return tuple(step for step in self.steps if not step.done)
 
+    @property
+    def on_threshold(self) -> bool:
+        """Whether the robot stands in or at a door, where two rooms are near."""
+        return any(e.sight.distance < THRESHOLD for e in self.scene.exits)
+
     def reached(self, clause: Clause) -> Sight | None:
         """Returns the thing of a clause if the robot is beside it."""
+        reach = REACH_FROM_DOOR if self.on_threshold else REACH
         for sight in self.scene.matching(clause):
             approached = self.last_target.endswith(sight.name) and self.origin is not None
-            if sight.near <= (APPROACHED if approached else REACH):
+            if sight.near <= (APPROACHED if approached else reach):
                 return sight
         return None
 

@@ -1,0 +1,128 @@
+"""The commands on good input, and the exit codes that are nobody's mistake."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from unilavira_drake.cli.main import main
+from unilavira_drake.cli.progress import Progress
+from unilavira_drake.errors import RenderingError
+from unilavira_drake.messages import LanguageAction, NavigationStatus, TodoItem, TodoList
+from unilavira_drake.recording.result import result_from_json
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def _no_preflight(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("unilavira_drake.cli.run.check_rendering", lambda: None)
+
+
+def test_a_run_tells_its_story_and_leaves_its_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "--max-decisions", "1", "--seed", "3", "--goal", "sofa_1"]) == 0
+    out = capsys.readouterr().out
+    assert out.splitlines()[0].startswith("model: rules on the simulator's labels")
+    assert "not a multimodal LLM" in out
+    assert "no success: decision_budget" in out
+    assert out.count("\n  unilavira ") == 3
+    folder = Path("runs/flat-fridge-1")
+    assert {path.name for path in folder.iterdir()} == {
+        "frames",
+        "map.png",
+        "result.json",
+        "scenario.yaml",
+        "timings.json",
+        "transcript.jsonl",
+    }
+    result = result_from_json((folder / "result.json").read_text())
+    assert (result.seed, result.task.name, result.task.goal) == (3, "fridge", "sofa_1")
+    assert (result.model.perception, result.model.reasoning) == ("ground_truth", "rules")
+    for line in (folder / "transcript.jsonl").read_text().splitlines():
+        assert list(json.loads(line)) == ["t", "decision", "system", "event", "data"]
+
+
+@pytest.mark.usefixtures("_no_preflight")
+def test_an_interrupt_keeps_what_was_done(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record = Progress.record
+
+    def interrupted(self: Progress, t: float, system: str, event: str, message: Any) -> None:
+        record(self, t, system, event, message)
+        if isinstance(message, LanguageAction):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Progress, "record", interrupted)
+    assert main(["run", "--out", "kept"]) == 130
+    assert "Traceback" not in capsys.readouterr().err
+    lines = Path("kept/transcript.jsonl").read_text().splitlines()
+    assert "panorama" in {json.loads(line)["event"] for line in lines}
+    result = result_from_json(Path("kept/result.json").read_text())
+    assert (result.cause, result.success) == ("interrupted", False)
+
+
+def test_a_machine_without_a_renderer_is_not_the_user_s_mistake(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken() -> None:
+        raise RenderingError("rendering: install libegl1")
+
+    monkeypatch.setattr("unilavira_drake.cli.run.check_rendering", broken)
+    monkeypatch.setattr("unilavira_drake.cli.doctor.check_rendering", broken)
+    for arguments in (["run"], ["doctor"]):
+        assert main(arguments) == 3
+        assert "install libegl1" in capsys.readouterr().err
+    assert not Path("runs").exists()
+
+
+def test_ports_come_from_the_built_diagram(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ports"]) == 0
+    table = capsys.readouterr().out
+    for row in ("agent.language", "navigation.governor", "front.depth_image", "LanguageAction"):
+        assert row in table
+    assert main(["ports", "--dot"]) == 0
+    assert capsys.readouterr().out.startswith("digraph")
+
+
+def test_scenarios_lists_what_can_be_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scenarios"]) == 0
+    listing = capsys.readouterr().out
+    for name in ("scenario flat", "@fridge (default)", "cobot_magic", "dining room"):
+        assert name in listing
+
+
+def test_help_names_every_flag_of_the_contract(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "--help"]) == 0
+    text = capsys.readouterr().out
+    flags = "task goal start scenario robot model language-model vision-model ablation seed"
+    for flag in [*flags.split(), "max-decisions", "renderer", "set", "out", "meshcat"]:
+        assert f"--{flag}" in text
+
+
+def test_the_list_is_printed_when_it_changes() -> None:
+    stream = io.StringIO()
+    progress = Progress(Console(file=stream, width=60))
+    items = (TodoItem("Leave", "completed", "door [behind]"), TodoItem("Enter"))
+    with progress:
+        progress.record(1.0, "", "", LanguageAction(n=1, call="decide", reasoning_action="a" * 90))
+        progress.record(1.1, "", "", TodoList(n=1, items=items))
+        progress.record(1.2, "", "", TodoList(n=2, items=items, feedback=("item 2 stays open",)))
+        progress.record(1.3, "", "", NavigationStatus(n=2, state="failed", reason="stuck"))
+    lines = [line.strip() for line in stream.getvalue().splitlines()]
+    assert lines[0].startswith("1. decide")
+    assert lines[1:] == [
+        "a" * 90,
+        "[x] Leave (door [behind])",
+        "[ ] Enter",
+        "! item 2 stays open",
+        "failed: stuck",
+    ]

@@ -1,0 +1,50 @@
+"""A mirrored flat with left and right exchanged in the words gives the mirrored path."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from unilavira_drake import load_scenario, run_episode
+from unilavira_drake.messages import Goal, LanguageAction
+
+EXCHANGED = {"left": "right", "right": "left"}
+
+
+def exchange(text: str) -> str:
+    """Returns the text with left and right exchanged."""
+    return re.sub(r"\b(left|right)\b", lambda match: EXCHANGED[match.group()], text)
+
+
+def walk(name: str, *, mirror: bool) -> tuple[bool | None, list[str], NDArray[np.float64]]:
+    """Returns success, the words of the actions, and the goals in the world."""
+    words: list[str] = []
+    goals: list[tuple[float, ...]] = []
+
+    def listen(t: float, system: str, event: str, message: Any) -> None:
+        if isinstance(message, LanguageAction):
+            words.append(f"{message.tool} {message.argument}")
+        if isinstance(message, Goal) and message.p_WG is not None:
+            goals.append(message.p_WG[:2])
+
+    scenario = load_scenario("flat", f"world: {{mirror: {str(mirror).lower()}}}")
+    task = scenario.tasks[name]
+    if mirror:
+        task.text = exchange(task.text)
+    scenario.task.text = f"@{name}"
+    result = run_episode(scenario, on_event=listen)
+    return result.success, words, np.array(goals)
+
+
+@pytest.mark.parametrize("name", ["fridge", "sofa", "desk"])
+def test_mirrored_world_and_words_give_the_mirrored_path(name: str) -> None:
+    success, words, goals = walk(name, mirror=False)
+    mirrored_success, mirrored_words, mirrored_goals = walk(name, mirror=True)
+    assert success
+    assert mirrored_success
+    assert mirrored_words == [exchange(word) for word in words]
+    assert np.abs(mirrored_goals * [1.0, -1.0] - goals).max() < 0.3

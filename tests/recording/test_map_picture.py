@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.messages import (
+    Goal,
+    LanguageAction,
+    NavigationStatus,
+    OccupancyMap,
+    Panorama,
+)
+from unilavira_drake.messages.metrics import EpisodeMetrics
+from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
+from unilavira_drake.recording.map_picture import map_picture
+from unilavira_drake.recording.trace import EpisodeTrace
+from unilavira_drake.worlds.world import Box, Room, World, WorldObject
+
+WORLD = World(
+    rooms=(Room("hall", "hall", (0.0, 0.0, 6.0, 4.0)),),
+    objects=(
+        WorldObject("sofa_1", "sofa", "red", "hall", (Box((1.0, 3.5, 0.4), (1.5, 0.6, 0.8)),)),
+    ),
+    walls=(Box((3.0, 0.0, 1.3), (6.0, 0.1, 2.6)),),
+)
+
+
+def pose(x: float, y: float) -> NDArray[np.float64]:
+    X_WB = np.eye(4)
+    X_WB[:2, 3] = x, y
+    return X_WB
+
+
+def episode() -> EpisodeTrace:
+    trace = EpisodeTrace()
+
+    def record(t: float, message: object) -> None:
+        trace.record(t, "", "", message)
+
+    for n, (x, y) in enumerate([(1.0, 1.0), (4.0, 1.0), (4.0, 1.0), (1.0, 1.0)], start=1):
+        record(10.0 * n, Panorama(n=n, X_WB=pose(x, y)))
+        waypoint = (1, 2, 2, 1)[n - 1]
+        record(10.0 * n, MllmRequest(n=n, variables=LanguageVariables(current_waypoint=waypoint)))
+    record(10.0, Goal(n=1, kind="go", p_WG=(4.2, 1.1, 0.0)))
+    record(30.0, Goal(n=3, kind="stay"))
+    record(30.0, LanguageAction(n=3, tool="backtrack", waypoint=1))
+    record(40.0, NavigationStatus(n=3, state="moving"))
+    record(45.0, NavigationStatus(n=3, state="arrived"))
+    for t in np.linspace(0.0, 50.0, 101):
+        record(float(t), EpisodeMetrics(x=2.5 - 1.5 * math.cos(t / 8), y=1.0))
+    return trace
+
+
+def test_the_trace_keeps_way_waypoints_backtracks_and_aims() -> None:
+    trace = episode()
+    assert trace.points.shape == (101, 3)
+    assert trace.waypoints == {1: (1.0, 1.0), 2: (4.0, 1.0)}
+    assert trace.backtracks == ((30.0, 45.0),)
+    assert trace.goals == [(4.2, 1.1)]
+
+
+def test_the_picture_is_a_png_of_the_same_bytes_each_time() -> None:
+    occupancy = OccupancyMap(log_odds=np.array([[0, -5], [9, 0]], np.int8))
+    pictures = [
+        map_picture(WORLD, episode(), occupancy, goals=((5.0, 3.0),), title="To the sofa.")
+        for _ in range(2)
+    ]
+    assert pictures[0] == pictures[1]
+    image = cv2.imdecode(np.frombuffer(pictures[0], np.uint8), cv2.IMREAD_COLOR)
+    assert image is not None
+    assert min(image.shape[:2]) > 500
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 50
+
+
+def test_an_episode_that_never_moved_has_a_picture_too() -> None:
+    assert map_picture(WORLD, EpisodeTrace()).startswith(b"\x89PNG")

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from unilavira_drake.errors import InputError
+from unilavira_drake.mllm.request import Usage
+from unilavira_drake.recording.result import (
+    EpisodeResult,
+    MetricsResult,
+    TaskResult,
+    installed_versions,
+    result_from_json,
+)
+
+RESULT = EpisodeResult(
+    scored=True,
+    success=False,
+    cause="stalled",
+    task=TaskResult("vln", "Gehe zur Tür.", "door", "door_1"),
+    metrics=MetricsResult(navigation_error_m=1.5, spl=0.0),
+    usage=Usage(input_tokens=3),
+    versions={"python": "3.11"},
+)
+
+
+def words(text: str) -> set[str]:
+    return set(text.split())
+
+
+def test_a_result_survives_its_file() -> None:
+    assert result_from_json(RESULT.to_json()) == RESULT
+
+
+def test_the_file_holds_the_public_names() -> None:
+    data = json.loads(EpisodeResult().to_json())
+    assert set(data) >= words(
+        "schema_version scored success cause task scenario robot ablation seed model metrics "
+        "counts usage time versions"
+    )
+    assert set(data["task"]) == {"family", "text", "name", "goal"}
+    assert set(data["model"]) == {"language", "vision", "perception", "reasoning"}
+    assert set(data["metrics"]) >= words(
+        "navigation_error_m path_length_m shortest_path_m spl oracle_success collisions "
+        "max_contact_force_n answer answer_correct"
+    )
+    assert set(data["counts"]) == words(
+        "decisions language_calls vision_calls reasks fallbacks backtracks"
+    )
+    assert set(data["usage"]) == {"input_tokens", "output_tokens", "images", "cost_usd"}
+    assert data["time"] == {"simulated_s": 0.0}
+    assert data["success"] is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "{}", '{"schema_version": 99}', RESULT.to_json().replace("cause", "causes")],
+)
+def test_another_file_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match=r"result\.json"):
+        result_from_json(text)
+
+
+def test_versions_are_told() -> None:
+    assert installed_versions()["python"].startswith("3.")
+    assert installed_versions()["drake"][0].isdigit()
