@@ -60,7 +60,7 @@ def test_wrong_type_is_named() -> None:
     source = builder.AddNamedSystem("source", Counter())
     target = builder.AddNamedSystem("target", Listener())
     builder.Connect(source.GetOutputPort("todo_list"), target.GetInputPort("goal"))
-    with pytest.raises(PortTypeError, match="target: input port 'goal' expects Goal.*TodoList"):
+    with pytest.raises(PortTypeError, match=r"target: input port 'goal' expects Goal.*TodoList"):
         Simulator(builder.Build()).AdvanceTo(0.1)
 
 

@@ -183,6 +183,7 @@ def test_the_base_follows_its_command():
     rig = Rig(start=(1.5, 5.0, 0.0))
     rig.drive(0.5, 0.5, 0.0, 0.0)
     x, _, _ = rig.drive(0.0, 0.5, 0.0, 0.0)
+    # Outputs are sampled once per time step of 25 ms, hence the tolerance.
     x_end, y, yaw = rig.drive(2.0, 0.5, 0.3, 0.0)
     assert x_end - x == pytest.approx(1.0, abs=0.02)
     assert (y, yaw) == pytest.approx((5.0, 0.0), abs=1e-6)
@@ -190,7 +191,7 @@ def test_the_base_follows_its_command():
     rig.drive(0.5, 0.0, 0.0, 0.8)
     _, _, before = rig.drive(0.0, 0.0, 0.0, 0.8)
     _, _, after = rig.drive(1.0, 0.0, 0.0, 0.8)
-    assert after - before == pytest.approx(0.8, abs=0.01)
+    assert after - before == pytest.approx(0.8, abs=0.021)
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def test_a_missing_port_is_named_with_those_that_exist() -> None:
     wiring = Wiring({"gain": PassThrough(1)})
     wiring.add("source", lambda: ConstantVectorSource([2.0]))
     wiring.add("gain", lambda: Gain(k=1.0, size=1))
-    with pytest.raises(PortTypeError, match="'gain' has no input port 'path'.*it has: u"):
+    with pytest.raises(PortTypeError, match=r"'gain' has no input port 'path'.*it has: u"):
         wiring.connect("source", "y0", "gain", "path")
 
 

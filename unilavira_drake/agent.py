@@ -20,6 +20,7 @@ from unilavira_drake.scenario import MemoryConfig
 from unilavira_drake.vision.system import Vision
 from unilavira_drake.wiring import Wiring
 
+
 @dataclass(frozen=True)
 class ModelChoice:
     """A model and how long it thinks."""

@@ -43,9 +43,7 @@ def make_navigation(
     # A command reaches the wheels in the plant's next step and shows in the one after.
     reaction = Reaction(delay=2.0 * time_step)
     wiring.add("controller", lambda: GroundTrackingController(limits=limits, reaction=reaction))
-    wiring.add(
-        "governor", lambda: Governor(limits=limits, footprint=footprint, offset=time_step)
-    )
+    wiring.add("governor", lambda: Governor(limits=limits, footprint=footprint, offset=time_step))
     wiring.connect("mapper", "map", "planner")
     wiring.connect("mapper", "map", "governor")
     wiring.connect("planner", "path", "controller")
@@ -81,6 +79,7 @@ def _add_mapper_and_planner(
             min_height=mapping.min_height,
             max_height=mapping.max_height,
             footprint_radius=robot.radius,
+            stride=mapping.stride,
             travel=mapping.travel,
             turn=math.radians(mapping.turn_degrees),
             rest_period=mapping.rest_period,

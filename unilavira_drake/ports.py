@@ -91,7 +91,19 @@ def pose_input(system: LeafSystem, name: str) -> InputReader[RigidTransform]:
 
 def image_input(system: LeafSystem, name: str, image_type: type[T]) -> InputReader[T]:
     """Declares an input port for one of Drake's image types."""
-    return InputReader(system, name, image_type, Value[image_type]())  # type: ignore[valid-type]
+    return InputReader(system, name, image_type, Value[image_type]())
+
+
+def pixels(image: Any) -> NDArray[Any]:
+    """Returns the (H, W, channels) pixels of a Drake image: a view, valid for this time only."""
+    data: NDArray[Any] = image.data
+    return data
+
+
+def pose_matrix(X: RigidTransform) -> NDArray[np.float64]:
+    """Returns a pose as a (4, 4) float64 matrix."""
+    matrix: Any = X.GetAsMatrix4()
+    return np.asarray(matrix, dtype=np.float64)
 
 
 class VectorReader:
@@ -110,7 +122,7 @@ class VectorReader:
             PortTypeError: if nothing is connected.
         """
         try:
-            value: NDArray[np.float64] = self._port.Eval(context)
+            value: Any = self._port.Eval(context)
         except (RuntimeError, ValueError):
             if self._port.HasValue(context):
                 raise
@@ -118,7 +130,8 @@ class VectorReader:
                 f"{self._system.GetSystemPathname()}: input port {self._name!r} is not connected; "
                 f"connect a vector of size {self._size}."
             ) from None
-        return value
+        vector: NDArray[np.float64] = value
+        return vector
 
 
 def vector_input(system: LeafSystem, name: str, size: int) -> VectorReader:
@@ -143,10 +156,14 @@ class Level(LeafSystem):
 
     def declare_output(self, name: str, view: Callable[[Any], Any], default: Any) -> None:
         """Declares an abstract output port that shows a view of the state."""
+
+        def show(context: Any, output: Any) -> None:
+            output.set_value(view(self.state(context)))
+
         self.DeclareAbstractOutputPort(
             name,
             lambda: AbstractValue.Make(default),
-            lambda context, output: output.set_value(view(self.state(context))),
+            show,
             prerequisites_of_calc=self._state_tickets,
         )
 
@@ -157,7 +174,8 @@ class Level(LeafSystem):
 
         So a numeric part of the state can be logged, saved and compared as plain numbers.
         """
-        index = self.DeclareDiscreteState(np.full(size, initial))
+        values: Any = np.full(size, initial)
+        index = self.DeclareDiscreteState(values)
         self._mirror = (int(index), view)
         self.DeclareStateOutputPort(name, index)
 
@@ -183,5 +201,6 @@ class Level(LeafSystem):
         state.get_mutable_abstract_state(int(self._state_index)).set_value(new)
         if self._mirror is not None:
             index, view = self._mirror
-            state.get_mutable_discrete_state(index).SetFromVector(view(new))
+            vector: Any = state.get_mutable_discrete_state(index)
+            vector.SetFromVector(view(new))
         return EventStatus.Succeeded()

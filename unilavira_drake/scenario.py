@@ -76,9 +76,11 @@ class MappingConfig:
     # Heights above the floor that count as obstacles, metres.
     min_height: float = 0.10
     max_height: float = 1.40
+    # Every so many rows and columns of a depth image; 3 pixels at 5 m are less than a cell.
+    stride: int = 3
     # Update after this much travel (metres) or turning (degrees); at rest this often (seconds).
-    travel: float = 0.15
-    turn_degrees: float = 15.0
+    travel: float = 0.2
+    turn_degrees: float = 20.0
     rest_period: float = 2.0
 
 
@@ -89,7 +91,7 @@ class PlanningConfig:
     # A goal moves at most this far to reachable free space, metres.
     snap_distance: float = 1.5
     # Arrived within this distance of the goal, metres.
-    tolerance: float = 0.15
+    tolerance: float = 0.10
     # Stuck after this long without progress, seconds.
     stuck_time: float = 6.0
     # Gives up after travelling this many times the planned length, plus 3 m.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
@@ -73,7 +76,8 @@ def make_navigation_station(
         - contact_results
         - cheat_X_WB
 
-    Images are rendered only when pulled, by one renderer for all clones of a Context.  ``cheat_X_WB`` is the true pose: for scoring only.
+    Images are rendered only when pulled, by one renderer for all clones of a Context.
+    ``cheat_X_WB`` is the true pose: for scoring only.
 
     Args:
         scenario: what to build.
@@ -90,7 +94,8 @@ def make_navigation_station(
         start = parse_start(choose_task(scenario).start, world, radius=scenario.robot.radius)
     builder = DiagramBuilder()
     plant, scene_graph, robot = _add_scene(builder, scenario, world)
-    plant.SetDefaultPositions(robot, list(start))
+    q: Any = np.array(start)
+    plant.SetDefaultPositions(robot, q)
     _add_base(builder, plant, robot)
     _add_front_camera(builder, plant, scenario, world)
     builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")

@@ -8,9 +8,7 @@ from pydrake.systems.framework import (
     Diagram,
     DiagramBuilder,
     InputPort,
-    InputPortIndex,
     OutputPort,
-    OutputPortIndex,
     System,
 )
 
@@ -70,7 +68,7 @@ class Wiring:
         system = self._levels[level]
         if not system.HasInputPort(port):
             names = [
-                system.get_input_port(InputPortIndex(i)).get_name()
+                system.get_input_port(i, warn_deprecated=False).get_name()
                 for i in range(system.num_input_ports())
             ]
             raise PortTypeError(_missing(level, "input", port, names))
@@ -79,10 +77,7 @@ class Wiring:
     def _output(self, level: str, port: str) -> OutputPort:
         system = self._levels[level]
         if not system.HasOutputPort(port):
-            names = [
-                system.get_output_port(OutputPortIndex(i)).get_name()
-                for i in range(system.num_output_ports())
-            ]
+            names = [system.get_output_port(i).get_name() for i in range(system.num_output_ports())]
             raise PortTypeError(_missing(level, "output", port, names))
         return system.GetOutputPort(port)
 

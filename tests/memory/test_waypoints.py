@@ -10,6 +10,7 @@ import pytest
 from unilavira_drake.memory.waypoints import MemoryBounds, WaypointState, remember
 from unilavira_drake.messages import LanguageAction, Outcome, Panorama, VisionAction
 
+NOTHING = LanguageAction()
 BOUNDS = MemoryBounds(waypoints=4, decisions=3, keyframes=2, merge_distance=0.5)
 
 
@@ -28,7 +29,7 @@ def turn(n: int, direction: str, scene: str = "") -> LanguageAction:
 def step(
     state: WaypointState,
     view: Panorama,
-    action: LanguageAction = LanguageAction(),
+    action: LanguageAction = NOTHING,
     target: str = "",
 ) -> WaypointState:
     vision = VisionAction(n=action.n, target_desc=target)

@@ -68,6 +68,21 @@ def _camera_pose(x, y, yaw):
 
 
 @numba.njit(cache=True)
+def _entry(origin, ray, size):
+    """Returns where a ray enters a box about the origin, or inf."""
+    near, far = 0.0, np.inf
+    for p, q, side in zip(origin, ray, size):  # noqa: B905 (numba knows no strict)
+        half = side / 2
+        if abs(q) < 1e-12:
+            if abs(p) > half:
+                return np.inf
+            continue
+        t0, t1 = (-half - p) / q, (half - p) / q
+        near, far = max(near, min(t0, t1)), min(far, max(t0, t1))
+    return near if near <= far else np.inf
+
+
+@numba.njit(cache=True)
 def _cast(boxes, X_WC, pinhole_, width, height):
     fx, fy, cx, cy = pinhole_
     depth = np.full((height, width), np.inf, np.float32)
@@ -107,18 +122,8 @@ def _cast(boxes, X_WC, pinhole_, width, height):
                 wy = R[1, 0] * x + R[1, 1] * y + R[1, 2]
                 wz = R[2, 0] * x + R[2, 1] * y + R[2, 2]
                 qx, qy = c * wx + s * wy, -s * wx + c * wy
-                near, far = 0.0, np.inf
-                for axis in range(3):
-                    p = px if axis == 0 else (py if axis == 1 else oz)
-                    q = qx if axis == 0 else (qy if axis == 1 else wz)
-                    half = (sx if axis == 0 else (sy if axis == 1 else sz)) / 2
-                    if abs(q) < 1e-12:
-                        if abs(p) > half:
-                            near = np.inf
-                        continue
-                    t0, t1 = (-half - p) / q, (half - p) / q
-                    near, far = max(near, min(t0, t1)), min(far, max(t0, t1))
-                if 0.1 < near <= far and near < depth[v, u] and near <= 10.0:
+                near = _entry((px, py, oz), (qx, qy, wz), (sx, sy, sz))
+                if 0.1 < near <= 10.0 and near < depth[v, u]:
                     depth[v, u] = near
                     index[v, u] = i
     return depth, index

@@ -113,8 +113,9 @@ def _graph(free, rows, columns):
     return csr_matrix((np.r_[length, length], (np.r_[a, b], np.r_[b, a])), shape=(size, size))
 
 
-def run(home, model, text, start, *, family="vln", todo=True, scb=True, seed=0, budget=40,
-        labels=None):
+def run(
+    home, model, text, start, *, family="vln", todo=True, scb=True, seed=0, budget=40, labels=None
+):
     """Runs one task to its end or to the budget of decisions."""
     measure = functools.partial(free_distance, min_height=0.1, max_height=1.4)
     detector = GroundTruthDetector(labels or home.world.labels)

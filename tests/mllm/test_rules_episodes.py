@@ -1,5 +1,6 @@
 """``rules`` drives whole episodes in the flat, with everything real but rendering and motion."""
 
+import dataclasses
 import json
 import re
 
@@ -8,6 +9,8 @@ import yaml
 from teleport_ring import RADIUS, Home, run
 
 from unilavira_drake.evaluation.scoring import in_room, make_goal_field, seen
+from unilavira_drake.messages import DIRECTIONS
+from unilavira_drake.mllm.request import ViewNote
 from unilavira_drake.mllm.rules import RulesModel
 from unilavira_drake.resources import models_path
 from unilavira_drake.sensors.detections import permuted_labels
@@ -94,9 +97,7 @@ def test_other_sentences_succeed(flat, name):
 
 
 def test_a_question_is_answered_at_the_thing(flat):
-    result = run(
-        flat, RulesModel(), "What colour is the bathtub?", "10.4,7.2,-1.57", family="eqa"
-    )
+    result = run(flat, RulesModel(), "What colour is the bathtub?", "10.4,7.2,-1.57", family="eqa")
     assert result.stopped
     assert result.answer == "pink"
 
@@ -126,15 +127,73 @@ def exchanged(text):
     return re.sub(r"\b(left|right)\b", lambda found: swap[found.group()], text)
 
 
-def test_a_mirrored_home_with_exchanged_words_gives_the_mirrored_way(flat, named_runs):
-    mirrored = Home(mirror=True)
-    for name in ("fridge", "sofa", "desk"):
-        task = TASKS[name]
-        result = run(mirrored, RulesModel(), exchanged(task["text"]), task["start"])
-        there, back = named_runs[name].decisions, result.decisions
-        assert [exchanged(d.action.argument) for d in there] == [d.action.argument for d in back]
-        for a, b in zip(there, back, strict=True):
-            assert (a.pose[0], a.pose[1]) == pytest.approx((b.pose[0], -b.pose[1]), abs=0.25)
+def turned_caption(text):
+    swap = {"+": "-", "-": "+"}
+    return re.sub(r"[+-](?=\d+ deg)", lambda found: swap[found.group()], exchanged(text))
+
+
+def mirrored_view(view):
+    width = view.width
+    return dataclasses.replace(
+        view,
+        direction=exchanged(view.direction),
+        detections=tuple(
+            dataclasses.replace(
+                d,
+                id=exchanged(d.id),
+                box=(width - d.box[2], d.box[1], width - d.box[0], d.box[3]),
+                point=(width - d.point[0], d.point[1]),
+            )
+            for d in view.detections
+        ),
+    )
+
+
+def mirrored(request):
+    v = request.variables
+    views = {exchanged(n.direction): n.free_distance for n in v.views}
+    variables = dataclasses.replace(
+        v,
+        task=exchanged(v.task),
+        views=tuple(ViewNote(d, views[d]) for d in DIRECTIONS),
+        last_action=exchanged(v.last_action),
+        todo=tuple(
+            dataclasses.replace(t, content=exchanged(t.content), result=exchanged(t.result))
+            for t in v.todo
+        ),
+        waypoints=tuple(
+            dataclasses.replace(
+                w, bearing=-w.bearing, heading=-w.heading, caption=turned_caption(w.caption),
+                tried=tuple(exchanged(text) for text in w.tried),
+            )
+            for w in v.waypoints
+        ),
+        decisions=tuple(
+            dataclasses.replace(d, text=exchanged(d.text)) for d in v.decisions
+        ),
+        failed_direction=exchanged(v.failed_direction),
+    )  # fmt: skip
+    evidence = {view.direction: view for view in map(mirrored_view, request.evidence)}
+    ordered = tuple(evidence[d] for d in DIRECTIONS)
+    return dataclasses.replace(request, variables=variables, evidence=ordered)
+
+
+def test_the_mirrored_request_with_exchanged_words_gives_the_mirrored_reply(named_runs):
+    compared = 0
+    for result in named_runs.values():
+        for decision in result.decisions:
+            there = json.loads(decision.reply)
+            back = json.loads(RulesModel().complete(mirrored(decision.request)).text)
+            if "action" in there:
+                action = {k: exchanged(v) if k == "direction" else v
+                          for k, v in there["action"].items()}  # fmt: skip
+                assert back["action"] == action
+                shown = [[u["op"], u["index"]] for u in there["todo_updates"]]
+                assert [[u["op"], u["index"]] for u in back["todo_updates"]] == shown
+                compared += 1
+            elif "todo" in there:
+                assert back["todo"] == [exchanged(item) for item in there["todo"]]
+    assert compared > 50
 
 
 def test_with_labels_permuted_it_does_not_succeed_by_luck(flat):

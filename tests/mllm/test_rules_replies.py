@@ -69,6 +69,15 @@ def test_the_plan_names_the_room_it_leaves_and_tells_unused_words():
     assert "yodel" in reply["reasoning"]
 
 
+def test_a_task_without_any_step_is_ended_and_told():
+    reply = ask("plan_todo", evidence("kitchen"), task="Sing a song!")
+    (item,) = reply["todo"]
+    assert "understood" in item
+    assert ask("decide", evidence("kitchen"), [(item,)])["action"] == {"tool": "double_check"}
+    check = ask("double_check", evidence("kitchen"), [(item,)])
+    assert "no step" in check["reasoning"]
+
+
 def test_a_visible_target_of_the_right_colour_is_chosen():
     views = evidence(
         "living room",

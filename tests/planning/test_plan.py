@@ -87,9 +87,11 @@ def test_an_empty_map_is_driven_through():
     assert found.length == pytest.approx(math.hypot(3, 1), abs=0.1)
 
 
-def test_a_far_target_outside_the_map_has_no_free_space_or_a_way():
-    far = plan(two_rooms(), (2.0, 3.0), (40.0, 3.0))
-    assert far.reason in ("", "no free space within 1.5 m", "unreachable")
+def test_targets_outside_the_closed_map_are_refused():
+    outside = plan(two_rooms(), (2.0, 3.0), (2.0, 8.0))
+    assert outside.reason == "no free space within 1.5 m"  # none that is known or reachable
+    lost = plan(two_rooms(), (2.0, 3.0), (1e9, 3.0), goal=(1e9, 3.0))
+    assert lost.reason == "no free space within 1.5 m"
 
 
 def test_slowness_keeps_to_the_middle_of_a_corridor():

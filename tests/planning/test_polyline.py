@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from unilavira_drake.planning.fast_marching import distance_field
 from unilavira_drake.planning.polyline import (
     extract_path,
+    final_heading,
     length,
     remaining_length,
     segment_cost,
@@ -122,3 +123,11 @@ def test_what_remains_of_a_path():
     assert remaining_length(points, 1.0, 0.5) == pytest.approx(6.0 + 0.5)
     assert remaining_length(points, 4.0, 2.0) == pytest.approx(1.0)
     assert remaining_length(points, 4.0, 4.0) == pytest.approx(1.0)
+
+
+def test_final_heading_looks_back_over_the_last_stretch():
+    corner = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]])
+    assert final_heading(corner) == pytest.approx(math.pi / 2)
+    hooked = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 0.05]])
+    assert final_heading(hooked) == pytest.approx(math.atan2(0.05, 2.0))
+    assert final_heading(np.array([[1.0, 1.0], [0.9, 1.0]])) == pytest.approx(math.pi)

@@ -107,9 +107,7 @@ def shown() -> ScriptedModel:
         (12, "arrived"),
     ],
 )
-def test_outcome_travels_with_the_next_panorama(
-    shown: ScriptedModel, n: int, outcome: str
-) -> None:
+def test_outcome_travels_with_the_next_panorama(shown: ScriptedModel, n: int, outcome: str) -> None:
     assert shown.request(n).variables.outcome.startswith(outcome)
 
 

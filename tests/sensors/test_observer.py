@@ -98,7 +98,7 @@ def test_a_blocked_turn_ends_at_the_deadline_with_the_true_pose() -> None:
     bench.run(40.0)  # the robot never turns: three views wait for the deadline
     panorama = bench.output("panorama")
     assert panorama.n == 1
-    assert panorama.frame("back").X_WC == pytest.approx(panorama.frame("front").X_WC)
+    assert pytest.approx(panorama.frame("front").X_WC) == panorama.frame("back").X_WC
 
 
 def test_waits_for_a_terminal_status_of_its_own_number() -> None:

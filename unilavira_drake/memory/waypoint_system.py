@@ -18,7 +18,7 @@ from unilavira_drake.messages import (
     SecondChance,
     VisionAction,
 )
-from unilavira_drake.ports import Level, image_input, message_input, pose_input
+from unilavira_drake.ports import Level, image_input, message_input, pixels, pose_input
 from unilavira_drake.sensors.encoding import encode_jpeg
 
 NUMBERS_PER_WAYPOINT = 5
@@ -97,7 +97,7 @@ class WaypointMemory(Level):
         x, y, _ = self._pose(context).translation()
         if math.dist((x, y), state.last_frame_position) < self._keyframe_travel:
             return state
-        jpeg = encode_jpeg(self._color(context).data[:, :, :3], width=THUMBNAIL_WIDTH)
+        jpeg = encode_jpeg(pixels(self._color(context))[:, :, :3], width=THUMBNAIL_WIDTH)
         return dataclasses.replace(
             state, frames=(*state.frames, jpeg), last_frame_position=(float(x), float(y))
         )

@@ -14,8 +14,11 @@ TERMINAL_STATES = ("arrived", "failed")
 
 @dataclass(frozen=True)
 class Goal(Message):
-    """The one goal of language action ``n``: ``go`` to ``p_WG``, ``stay``, or ``none`` with a
-    reason.  ``heading``, when given, is the world yaw at which the next sweep starts."""
+    """The one goal of language action ``n``: ``go`` to ``p_WG``, ``stay``, or ``none``.
+
+    ``none`` has a reason.  ``heading``, when given, is the world yaw at which the next sweep
+    starts.
+    """
 
     n: int = 0
     kind: str = "stay"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +12,9 @@ from unilavira_drake.messages import Message, OccupancyMap
 from unilavira_drake.planning import fast_marching, navigation_grid, polyline, snapping
 from unilavira_drake.planning.navigation_grid import NavigationGrid, make_navigation_grid
 from unilavira_drake.planning.snapping import UNREACHABLE, snap
+
+HORIZON = 30.0
+"""A target outside the map farther than this from the robot is not looked for, metres."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,7 @@ def make_plan(
     grid = make_navigation_grid(
         occupancy,
         position=position,
-        targets=(target,) if goal is None else (target, goal),
+        targets=(target,) if math.dist(target, position) <= HORIZON else (),
         radius=parameters.radius,
         turning_radius=parameters.turning_radius,
     )
@@ -99,6 +103,8 @@ def _kept(
     grid: NavigationGrid, reachable: NDArray[np.bool_], goal: tuple[float, float]
 ) -> tuple[int, int] | None:
     cell = grid.cell(*goal)
+    if not grid.contains(cell):
+        return None
     stands = not grid.blocked[cell] and bool(reachable[cell]) and grid.log_odds[cell] < 0
     return cell if stands else None
 

@@ -191,3 +191,12 @@ def warm_up() -> None:
     times = np.array([[0.0, 1.0]], np.float32)
     points = extract_path(times, free, np.ones((1, 2), np.float32), (1.5, 0.5))
     remaining_length(frozen_view(points, np.float64), 0.0, 0.0)
+
+
+def final_heading(points: NDArray[np.float64], stretch: float = 0.6) -> float:
+    """Returns the world yaw of the last ``stretch`` metres of a (k, 2) polyline, radians."""
+    end = points[-1]
+    gaps = np.hypot(*(points - end).T)
+    far = np.flatnonzero(gaps >= stretch)
+    start = points[far[-1]] if len(far) else points[0]
+    return math.atan2(end[1] - start[1], end[0] - start[0])

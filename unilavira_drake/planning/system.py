@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context
 from unilavira_drake.messages import Goal, Message, NavigationStatus, OccupancyMap, Path
 from unilavira_drake.planning.navigation_grid import path_is_blocked
 from unilavira_drake.planning.plan import Plan, PlanningParameters, make_plan, warm_up
-from unilavira_drake.planning.polyline import remaining_length
+from unilavira_drake.planning.polyline import final_heading, remaining_length
 from unilavira_drake.ports import Level, message_input, pose_input
 
 PROGRESS = 0.05
@@ -19,6 +19,9 @@ PROGRESS = 0.05
 
 BUDGET_BASE = 3.0
 """Travel that is always granted beyond the planned length times the travel factor, metres."""
+
+FINAL_STRETCH = 0.75
+"""Nearer to the goal than this only a blocked way is planned anew, metres."""
 
 Point = tuple[float, float]
 
@@ -51,8 +54,10 @@ class FastMarchingPlanner(Level):
     """Plans on free floor to each goal and reports ``arrived`` or ``failed`` with the reason.
 
     Goal n is taken up once the map holds panorama n.  While the robot moves, the way is planned
-    anew when a new map blocks it, or when the map changed and the plan is ``replan_period`` old.
-    A terminal status and the empty path are views of one state.  Reasons of failure: the goal's
+    anew when a new map blocks it, or when the map changed and the plan is ``replan_period`` old
+    and the goal is not near.
+    A robot arrives facing the way it came, whatever its last small correction was, unless the
+    goal names a heading.  A terminal status and the empty path are views of one state.  Reasons of failure: the goal's
     own, ``unreachable``, ``no free space within ... m``, ``stuck``, ``travel budget``.
 
     .. pydrake_system::
@@ -170,7 +175,8 @@ class FastMarchingPlanner(Level):
         points = state.path.p_WP
         goal = (float(points[-1, 0]), float(points[-1, 1]))
         if math.dist(position, goal) <= self._tolerance:
-            return _done(state.status.n, "arrived", "", state.heading)
+            heading = final_heading(points) if state.heading is None else state.heading
+            return _done(state.status.n, "arrived", "", heading)
         step = math.dist(position, state.position)
         if step >= PROGRESS:
             travelled = state.travelled + step
@@ -193,6 +199,8 @@ class FastMarchingPlanner(Level):
         time: float,
     ) -> PlannerState:
         due = time - state.plan_time >= self._replan_period - 1e-9
+        # A new plan over the last stretch could only shake the heading of the arrival.
+        due = due and math.dist(position, goal) > FINAL_STRETCH
         if occupancy.version == state.map_version or (
             occupancy.version == state.checked_version and not due
         ):

@@ -23,7 +23,15 @@ from unilavira_drake.messages import (
     Sweep,
     read_only,
 )
-from unilavira_drake.ports import Level, image_input, message_input, pose_input, vector_input
+from unilavira_drake.ports import (
+    Level,
+    image_input,
+    message_input,
+    pixels,
+    pose_input,
+    pose_matrix,
+    vector_input,
+)
 from unilavira_drake.sensors.encoding import encode_jpeg
 
 
@@ -110,7 +118,7 @@ class Observer(Level):
     def _begin(
         self, context: Context, state: ObserverState, status: NavigationStatus
     ) -> ObserverState:
-        X_WB = self._pose(context).GetAsMatrix4()
+        X_WB = pose_matrix(self._pose(context))
         yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
         n = status.n + 1
         outcome = Outcome(status.state, status.reason)
@@ -128,7 +136,7 @@ class Observer(Level):
         )
 
     def _capture(self, context: Context, state: ObserverState) -> ObserverState:
-        X_WB = self._pose(context).GetAsMatrix4()
+        X_WB = pose_matrix(self._pose(context))
         yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
         twist = self._twist(context)
         time = context.get_time()
@@ -154,16 +162,16 @@ class Observer(Level):
         )
 
     def _frame(self, context: Context, view: str, X_WB: NDArray[np.float64], time: float) -> Frame:
-        color = read_only(self._color(context).data[:, :, :3])
+        color = read_only(pixels(self._color(context))[:, :, :3])
         return Frame(
             view=view,
             time=time,
             color=color,
-            depth=read_only(self._depth(context).data[:, :, 0]),
-            label=read_only(self._label(context).data[:, :, 0]),
+            depth=read_only(pixels(self._depth(context))[:, :, 0]),
+            label=read_only(pixels(self._label(context))[:, :, 0]),
             jpeg=encode_jpeg(color),
             intrinsics=self._intrinsics,
-            X_WC=X_WB @ self._X_BC(context).GetAsMatrix4(),
+            X_WC=X_WB @ pose_matrix(self._X_BC(context)),
         )
 
 

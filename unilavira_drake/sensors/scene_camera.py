@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, LeafSystem
 from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I, ImageRgba8U
 
@@ -38,10 +40,14 @@ class SceneCamera(LeafSystem):
     def __init__(self, scene: Diagram) -> None:
         super().__init__()
         self._scene = scene
-        self._plant: Any = scene.GetSubsystemByName("plant")
+        plant = scene.GetSubsystemByName("plant")
+        assert isinstance(plant, MultibodyPlant)
+        self._plant = plant
         # The renderer's own memory; every picture sets all positions before it is drawn.
         self._scene_context = scene.CreateDefaultContext()
-        self._state = vector_input(self, "plant_state", self._plant.num_multibody_states())
+        self._state = vector_input(
+            self, "plant_state", self._plant.num_positions() + self._plant.num_velocities()
+        )
         ticket = self.input_port_ticket(self.GetInputPort("plant_state").get_index())
         for name, image_type in (
             ("color_image", ImageRgba8U),
@@ -50,13 +56,13 @@ class SceneCamera(LeafSystem):
         ):
             self.DeclareAbstractOutputPort(
                 name,
-                lambda image_type=image_type: Value[image_type](),
-                lambda context, output, name=name: self._render(context, output, name),
+                Value[image_type],
+                functools.partial(self._render, name),
                 prerequisites_of_calc={ticket},
             )
 
-    def _render(self, context: Context, output: Any, name: str) -> None:
-        positions = self._state(context)[: self._plant.num_positions()]
+    def _render(self, name: str, context: Context, output: Any) -> None:
+        positions: Any = self._state(context)[: self._plant.num_positions()]
         plant_context = self._plant.GetMyMutableContextFromRoot(self._scene_context)
         if not np.array_equal(positions, self._plant.GetPositions(plant_context)):
             self._plant.SetPositions(plant_context, positions)

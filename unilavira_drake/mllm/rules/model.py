@@ -15,6 +15,10 @@ from unilavira_drake.mllm.rules.situation import Situation, assess
 from unilavira_drake.mllm.rules.vision import ground
 
 
+NOTHING_UNDERSTOOD = "No step of the task was understood"
+"""The plan for such a task; it is no clause, so the model asks to stop at once and says why."""
+
+
 class RulesModel:
     """A stateless, deterministic function of one request; needs no key and no network.
 
@@ -63,5 +67,5 @@ def _plan(situation: Situation) -> dict[str, Any]:
     words = f"Words not used: {', '.join(unused)}." if unused else "Every word was used."
     return {
         "reasoning": f"{len(clauses)} clauses found in the text. {words}",
-        "todo": items_of(clauses),
+        "todo": items_of(clauses) or [NOTHING_UNDERSTOOD],
     }

@@ -79,7 +79,9 @@ def _floors(situation: Situation, aim: Aim) -> Iterator[Option]:
         return
     for s in situation.scene.floors:
         if s.room == goal.room != situation.scene.room:
-            cost = -80.0 + s.distance + turn_cost(aim, s.bearing)
+            # From a corridor, what is seen through one room has a door of its own further on.
+            cost = 2.0 if is_hub(situation.scene.room) else -80.0
+            cost += s.distance + turn_cost(aim, s.bearing)
             cost += tried_cost(situation, s.direction)
             target = f"floor of the {s.room}"
             yield Option(s.direction, s.bearing, s.distance, target, cost, f"{target} seen", s.id)

@@ -176,7 +176,9 @@ def _exits(
     own = [
         door
         for door in doors
-        if not _behind(door, doors) and (room in HUBS or not _past_threshold(door, doors))
+        if not _behind(door, doors)
+        and not _stands_elsewhere(door, floors, room)
+        and (room in HUBS or not _past_threshold(door, doors))
     ]
     exits = _distinct([_door_exit(door, floors, room) for door in own], views)
     for floor in sorted(floors, key=lambda f: f.distance):
@@ -246,6 +248,20 @@ def _same_door(a: Exit, b: Exit, width: dict[str, int]) -> bool:
     )
     apart = math.dist(a.sight.position, b.sight.position)
     return apart < (1.4 if cut and angle_between(a.sight.bearing, b.sight.bearing) < 60 else 0.9)
+
+
+def _stands_elsewhere(door: Sight, floors: Sequence[Sight], room: str) -> bool:
+    """Whether the floor at the foot of a door is that of another room."""
+    u_min, _, u_max, v_max = door.detection.box
+    u, v = (u_min + u_max) / 2, v_max + 4.0
+    at_foot = [
+        (f.detection.box[2] - f.detection.box[0], f.room != room)
+        for f in floors
+        if f.direction == door.direction
+        and f.detection.box[0] <= u <= f.detection.box[2]
+        and f.detection.box[1] <= v <= f.detection.box[3]
+    ]
+    return bool(at_foot) and min(at_foot)[1]
 
 
 def _past_threshold(door: Sight, doors: Sequence[Sight]) -> bool:

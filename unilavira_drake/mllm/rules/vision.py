@@ -11,11 +11,19 @@ from unilavira_drake.mllm.evidence import Detection, ViewEvidence
 from unilavira_drake.mllm.request import VisionVariables
 from unilavira_drake.mllm.rules.floor_camera import FloorCamera
 from unilavira_drake.mllm.rules.lexicon import tokenize
-from unilavira_drake.mllm.rules.vocabulary import class_match, color_name, room_kind, thing_class
+from unilavira_drake.mllm.rules.vocabulary import (
+    HUBS,
+    class_match,
+    color_name,
+    room_kind,
+    thing_class,
+)
 
 _ORDER = re.compile(r"Target: (.+?), about ([\d.]+) m, ([\d.]+) deg (left|right) of")
 _INSIDE = 1.2
 """How far behind a door the robot is to go, metres."""
+_INSIDE_HUB = 0.8
+"""The same for corridors, which are narrow."""
 
 
 def ground(variables: VisionVariables, evidence: Sequence[ViewEvidence]) -> dict[str, Any]:
@@ -92,19 +100,36 @@ def _floor(view: ViewEvidence, room: str, bearing: float) -> dict[str, Any]:
 
 
 def _beyond(view: ViewEvidence, room: str, distance: float, bearing: float) -> dict[str, Any]:
-    """Selects floor a step behind a door, on the line of sight through its opening."""
+    """Selects floor a step behind a door, on a line of sight through its opening."""
     floor = _floor_of(view, room, bearing)
     if floor is None:
         return _nothing(f"no floor of the {room} in this view")
     camera = FloorCamera.fit([view])
-    u, v = floor.point
-    row = camera.row(u, distance + _INSIDE)
-    lowest, highest = floor.box[3] - 2.0, floor.box[1] + 2.0
-    # Nearer than the floor's own inner point the line of sight stays on that floor only as far
-    # as its box tells; the inner point itself is the safe choice everywhere else.
-    if floor.point_distance < distance + _INSIDE or not highest <= row <= lowest:
-        row = v
-    return _reply(f"door to the {room}", f"detection {floor.id}", point=[u, row])
+    goal = distance + (_INSIDE_HUB if room in HUBS else _INSIDE)
+    u_min, v_min, u_max, v_max = floor.box
+    door = _door_of(view, floor, distance)
+    columns = [floor.point[0]]
+    if door is not None:
+        columns.insert(0, (door.box[0] + door.box[2]) / 2)
+    for u in columns:
+        row = camera.row(u, goal)
+        inside = u_min + 2.0 <= u <= u_max - 2.0 and v_min + 2.0 <= row <= v_max - 2.0
+        if inside:
+            return _reply(f"door to the {room}", f"detection {floor.id}", point=[u, row])
+    return _reply(f"door to the {room}", f"detection {floor.id}", point=[*floor.point])
+
+
+def _door_of(view: ViewEvidence, floor: Detection, distance: float) -> Detection | None:
+    """Returns the door, wholly in view, through whose opening a floor is seen."""
+    doors = [
+        d
+        for d in view.detections
+        if d.category == "door"
+        and d.box[0] > 2.0
+        and d.box[2] < view.width - 2.0
+        and d.box[0] <= floor.point[0] <= d.box[2]
+    ]
+    return min(doors, key=lambda d: (abs(d.distance - distance), d.id), default=None)
 
 
 def _open_floor(view: ViewEvidence, distance: float, bearing: float) -> dict[str, Any]:
