@@ -19,7 +19,7 @@ from unilavira_drake.messages import (
     VisionAction,
 )
 from unilavira_drake.ports import Level, image_input, message_input, pixels, pose_input
-from unilavira_drake.sensors.encoding import encode_jpeg
+from unilavira_drake.sensors.encoding import encode_jpeg, rgb_of
 
 NUMBERS_PER_WAYPOINT = 5
 """Id, x, y, z (metres) and heading (radians); an id of 0 marks a free slot."""
@@ -88,7 +88,9 @@ class WaypointMemory(Level):
         action = self._action(context)
         if action.n != panorama.n - 1:
             return state
-        thumbnail = encode_jpeg(panorama.frame("front").color, width=THUMBNAIL_WIDTH)
+        thumbnail = b""
+        if panorama.first == panorama.n:
+            thumbnail = encode_jpeg(panorama.frame("front").color, width=THUMBNAIL_WIDTH)
         return remember(state, panorama, action, self._vision(context), thumbnail, self._bounds)
 
     def _watch(self, context: Context, state: WaypointState) -> WaypointState:
@@ -97,7 +99,7 @@ class WaypointMemory(Level):
         x, y, _ = self._pose(context).translation()
         if math.dist((x, y), state.last_frame_position) < self._keyframe_travel:
             return state
-        jpeg = encode_jpeg(pixels(self._color(context))[:, :, :3], width=THUMBNAIL_WIDTH)
+        jpeg = encode_jpeg(rgb_of(pixels(self._color(context))), width=THUMBNAIL_WIDTH)
         return dataclasses.replace(
             state, frames=(*state.frames, jpeg), last_frame_position=(float(x), float(y))
         )

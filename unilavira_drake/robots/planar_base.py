@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.common.value import AbstractValue
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, LeafSystem
 
 from unilavira_drake.ports import vector_input
@@ -68,13 +68,12 @@ class PlanarBase(LeafSystem):
         output.set_value(planar_pose(float(x), float(y), float(yaw)))
 
     def _calc_twist(self, context: Any, output: Any) -> None:
-        _, _, yaw, vx, vy, wz = self._joint_state(context)
+        _, _, yaw, vx, vy, wz = self._joint_state(context).tolist()
         c, s = math.cos(yaw), math.sin(yaw)
         output.SetFromVector([0.0, 0.0, wz, c * vx + s * vy, c * vy - s * vx, 0.0])
 
 
 def planar_pose(x: float, y: float, yaw: float) -> RigidTransform:
     """Returns X_WB of a base on the floor."""
-    c, s = math.cos(yaw), math.sin(yaw)
-    matrix: Any = np.array([[c, -s, 0.0, x], [s, c, 0.0, y], [0.0, 0.0, 1.0, 0.0]])
-    return RigidTransform(matrix)
+    p_WB: Any = np.array([x, y, 0.0])
+    return RigidTransform(RotationMatrix.MakeZRotation(yaw), p_WB)

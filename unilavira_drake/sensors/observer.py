@@ -32,7 +32,7 @@ from unilavira_drake.ports import (
     pose_matrix,
     vector_input,
 )
-from unilavira_drake.sensors.encoding import encode_jpeg
+from unilavira_drake.sensors.encoding import encode_jpeg, rgb_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +162,7 @@ class Observer(Level):
         )
 
     def _frame(self, context: Context, view: str, X_WB: NDArray[np.float64], time: float) -> Frame:
-        color = read_only(pixels(self._color(context))[:, :, :3])
+        color = rgb_of(pixels(self._color(context)))
         return Frame(
             view=view,
             time=time,

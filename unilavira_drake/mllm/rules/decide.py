@@ -10,7 +10,6 @@ from unilavira_drake.mllm.rules.clauses import describe
 from unilavira_drake.mllm.rules.lexicon import unused_words
 from unilavira_drake.mllm.rules.memory import (
     Place,
-    explored,
     is_hub,
     open_ends,
     remembers,
@@ -119,16 +118,20 @@ def _way_back(situation: Situation, aim: Aim, ranked: list[Option]) -> Place | N
         cost = _RETURN + 0.3 * place.distance + 3.0 * before
         if goal is not None and goal.category and remembers(place, goal) and not place.tried:
             cost -= 10.0
-        elif (
-            not (is_hub(place.room) or open_ends(place, situation.visited))
-            or situation.scene.room == place.room
-            or explored("", place.position, ())
-        ):
+        elif not _leads_on(place, situation):
             continue
         costs.append((round(cost, 3), -place.id, place))
     if not costs or min(costs)[0] >= best:
         return None
     return min(costs)[2]
+
+
+def _leads_on(place: Place, situation: Situation) -> bool:
+    """Whether new ways may start at a place; from a corridor only another corridor does better."""
+    here = situation.scene.room
+    if place.room == here or (is_hub(here) and not is_hub(place.room)):
+        return False
+    return is_hub(place.room) or open_ends(place, situation.visited) > 0
 
 
 def _analysis(situation: Situation, progress: Progress) -> str:

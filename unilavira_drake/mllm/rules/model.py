@@ -14,7 +14,6 @@ from unilavira_drake.mllm.rules.plan import clauses_of, items_of
 from unilavira_drake.mllm.rules.situation import Situation, assess
 from unilavira_drake.mllm.rules.vision import ground
 
-
 NOTHING_UNDERSTOOD = "No step of the task was understood"
 """The plan for such a task; it is no clause, so the model asks to stop at once and says why."""
 

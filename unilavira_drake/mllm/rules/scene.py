@@ -21,6 +21,8 @@ from unilavira_drake.mllm.rules.vocabulary import (
 
 _AT_HAND = 1.2
 """Metres."""
+_FULL_VOTE = 0.15
+"""Share of a view that floor must cover for the view's full vote on where the robot is."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +156,7 @@ def _underfoot(
             framed = any(_inside(floor, d) and floor.near > d.distance for d in doors)
             weight = floor.pixels * (1.0 if near else 0.1) * (0.2 if framed else 1.0)
             weights.append((floor, weight))
-        area = 0.02 * view.width * view.height
+        area = _FULL_VOTE * view.width * view.height
         total = max(sum(weight for _, weight in weights), area)
         for floor, weight in weights:
             votes[floor.room] = votes.get(floor.room, 0.0) + weight / total
