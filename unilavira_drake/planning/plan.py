@@ -63,7 +63,7 @@ def make_plan(
         position: (x, y) of the robot, metres.
         target: (x, y) of the selected point, metres.
         viewpoint: (x, y) from which the target was seen, metres.
-        goal: (x, y) of the goal snapped before; kept while the robot can stand there.
+        goal: (x, y) of the goal snapped before; kept while the robot can stand and turn there.
         parameters: the robot's size and the bound on snapping.
     """
     grid = make_navigation_grid(
@@ -75,7 +75,7 @@ def make_plan(
     )
     here = grid.cell(*position)
     reachable = grid.reachable(here)
-    cell = None if goal is None else _kept(grid, reachable, goal)
+    cell = None if goal is None else _kept(grid, reachable, goal, parameters.turning_radius)
     if cell is None:
         snapped = snap(
             grid,
@@ -100,13 +100,19 @@ def make_plan(
 
 
 def _kept(
-    grid: NavigationGrid, reachable: NDArray[np.bool_], goal: tuple[float, float]
+    grid: NavigationGrid,
+    reachable: NDArray[np.bool_],
+    goal: tuple[float, float],
+    turning_radius: float,
 ) -> tuple[int, int] | None:
+    """Returns the cell of a goal snapped before, unless the map now shows it to be a bad one."""
     cell = grid.cell(*goal)
     if not grid.contains(cell):
         return None
     stands = not grid.blocked[cell] and bool(reachable[cell]) and grid.log_odds[cell] < 0
-    return cell if stands else None
+    # One cell less than asked at first, so that the noise of a border does not move the goal.
+    room = float(grid.clearance[cell]) >= turning_radius - grid.resolution
+    return cell if stands and room else None
 
 
 def warm_up() -> None:

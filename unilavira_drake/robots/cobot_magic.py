@@ -22,7 +22,7 @@ class CobotMagic:
     # Radius that the planner keeps free around the base's centre.
     radius: float = 0.36
     # Radius swept when the base turns in place; goals keep this clearance where they can.
-    turning_radius: float = 0.50
+    turning_radius: float = 0.52
     # Front camera: image size in pixels, horizontal field of view in degrees.
     image_width: int = 640
     image_height: int = 480

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from unilavira_drake.messages import VIEW_YAW
+from unilavira_drake.messages import VIEW_YAW, direction_of
 from unilavira_drake.mllm.rules.aim import Aim, side_cost, turn_cost
 from unilavira_drake.mllm.rules.exit_options import exit_options
 from unilavira_drake.mllm.rules.memory import is_hub
@@ -29,6 +29,7 @@ def options(situation: Situation, aim: Aim) -> list[Option]:
         *_passing(situation, aim),
         *exit_options(situation, aim),
         *_floors(situation, aim),
+        *_remembered(situation, aim),
         *_open_floor(situation, aim),
     ]
     failed = situation.variables.failed_direction
@@ -85,6 +86,23 @@ def _floors(situation: Situation, aim: Aim) -> Iterator[Option]:
             cost += tried_cost(situation, s.direction)
             target = f"floor of the {s.room}"
             yield Option(s.direction, s.bearing, s.distance, target, cost, f"{target} seen", s.id)
+
+
+def _remembered(situation: Situation, aim: Aim) -> Iterator[Option]:
+    """Doors to the wanted room that captions of earlier places tell of, where none is in view."""
+    goal = aim.goal
+    if goal is None or goal.kind not in ("enter", "through", "along") or aim.ends_first:
+        return
+    for place in situation.places:
+        for kind, (x, y) in place.exits:
+            distance, bearing = math.hypot(x, y), math.degrees(math.atan2(y, x))
+            if kind != goal.room or distance < 0.8:
+                continue
+            direction = direction_of(math.radians(bearing))
+            cost = -40.0 + distance + turn_cost(aim, bearing) + tried_cost(situation, direction)
+            why = f"at waypoint {place.id} a door to the {kind} was seen"
+            cites = situation.scene.room_id
+            yield Option(direction, bearing, distance, "open floor", cost, why, cites)
 
 
 def _open_floor(situation: Situation, aim: Aim) -> Iterator[Option]:
