@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 from collections.abc import Callable, Mapping
@@ -28,8 +29,8 @@ from unilavira_drake.task_choice import choose_task
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.start import parse_start
 
-SAMPLE_PERIOD = 0.5
-"""Simulated seconds between two points of the driven way; an interrupt waits no longer."""
+ADVANCE = 1.0
+"""Simulated seconds that are advanced at once; an interrupt waits no longer."""
 
 
 def run_episode(
@@ -63,22 +64,24 @@ def run_episode(
     listeners: list[Listener] = [tally.record, trace.record]
     if on_event is not None:
         listeners.append(on_event)
-
-    def run() -> tuple[_Run, EpisodeResult]:
-        episode = _Run(scenario, goal, listeners, replace, detector, trace)
+    episode = _Run(scenario, goal, listeners, replace, detector)
+    with contextlib.ExitStack() as stack:
+        folder = None
+        # Only now: what cannot be built leaves no folder behind.
+        if out is not None:
+            folder = stack.enter_context(RunFolder(out))
+            folder.write("scenario.yaml", dump_scenario(scenario))
+            listeners.append(folder.record)
         episode.simulate()
         verdict = score(goal, episode.metrics, start[:2], episode.output("observer", "panorama"))
-        return episode, episode_result(scenario, task, episode.metrics, verdict, tally)
-
-    if out is None:
-        return run()[1]
-    with RunFolder(out) as folder:
-        listeners.append(folder.record)
-        folder.write("scenario.yaml", dump_scenario(scenario))
-        episode, result = run()
-        folder.write("result.json", result.to_json())
-        folder.write("timings.json", json.dumps(episode.timings, indent=2) + "\n")
-        folder.write("map.png", episode.picture(world, goal, task.spec.text))
+        result = episode_result(scenario, task, episode.metrics, verdict, tally)
+        if folder is not None:
+            folder.write("result.json", result.to_json())
+            folder.write("timings.json", json.dumps(episode.timings, indent=2) + "\n")
+            occupancy = episode.output("navigation", "map")
+            goals = () if goal is None else goal.places
+            title = task.spec.text
+            folder.write("map.png", map_picture(world, trace, occupancy, goals=goals, title=title))
     return result
 
 
@@ -92,16 +95,14 @@ class _Run:
         listeners: list[Listener],
         replace: Mapping[str, System] | None,
         detector: Callable[[Frame], ViewEvidence] | None,
-        trace: EpisodeTrace,
     ) -> None:
         started = time.perf_counter()
-        self._trace = trace
         self._diagram: Diagram = make_navigation_diagram(
             scenario,
             replace=replace,
             detector=detector,
             goal_distance=None if goal is None else goal.distance,
-            on_message=MessageLog(*listeners),
+            on_message=MessageLog(listeners),
         )
         self._simulator = Simulator(self._diagram)
         self._interrupted = False
@@ -112,11 +113,10 @@ class _Run:
         wall, cpu = time.perf_counter(), time.process_time()
         ended = SimulatorStatus.ReturnReason.kReachedTerminationCondition
         try:
-            while self._simulator.AdvanceTo(self._time() + SAMPLE_PERIOD).reason() != ended:
-                self._sample()
+            while self._simulator.AdvanceTo(self._time() + ADVANCE).reason() != ended:
+                pass
         except KeyboardInterrupt:
             self._interrupted = True
-        self._sample()
         self.timings["episode_wall_s"] = round(time.perf_counter() - wall, 3)
         self.timings["episode_cpu_s"] = round(time.process_time() - cpu, 3)
 
@@ -130,17 +130,6 @@ class _Run:
         """The monitor's metrics; the cause is ``interrupted`` when a person ended the run."""
         metrics = self.output("episode_monitor", "metrics")
         return metrics.interrupted() if self._interrupted and not metrics.ended else metrics
-
-    def picture(self, world: Any, goal: GoalField | None, title: str) -> bytes:
-        """Returns the map of the episode as PNG."""
-        occupancy = self.output("navigation", "map")
-        goals = () if goal is None else goal.places
-        return map_picture(world, self._trace, occupancy, goals=goals, title=title)
-
-    def _sample(self) -> None:
-        self._trace.record(
-            self._time(), "episode_monitor", "metrics", self.output("episode_monitor", "metrics")
-        )
 
     def _time(self) -> float:
         return float(self._context().get_time())

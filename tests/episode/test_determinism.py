@@ -73,7 +73,7 @@ def test_a_cloned_context_has_the_same_future_without_extra_calls(time: float) -
         seen.append((t, system, event))
 
     scenario = load_scenario("flat", LATENCY + "budgets: {decisions: 20}\n")
-    diagram = make_navigation_diagram(scenario, on_message=MessageLog(listen))
+    diagram = make_navigation_diagram(scenario, on_message=MessageLog([listen]))
     simulator = Simulator(diagram)
     simulator.AdvanceTo(time)
     clone = simulator.get_context().Clone()

@@ -33,7 +33,7 @@ def build(seen: Seen) -> Diagram:
 
     builder = DiagramBuilder()
     counter = builder.AddSystem(Counter())
-    recorder = builder.AddSystem(Recorder(MessageLog(listen), period=0.1))
+    recorder = builder.AddSystem(Recorder(MessageLog([listen]), period=0.1))
     builder.Connect(
         counter.GetOutputPort("language_action"), recorder.GetInputPort("language_action")
     )
@@ -84,7 +84,7 @@ def test_the_recorder_keeps_nothing_of_its_own() -> None:
 
 def test_what_makes_a_message_new() -> None:
     seen: Seen = []
-    log = MessageLog(lambda *event: seen.append(event))
+    log = MessageLog([lambda *event: seen.append(event)])
     for message in (
         MllmRequest(),
         MllmRequest(n=1),

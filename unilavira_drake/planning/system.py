@@ -54,11 +54,11 @@ class FastMarchingPlanner(Level):
     """Plans on free floor to each goal and reports ``arrived`` or ``failed`` with the reason.
 
     Goal n is taken up once the map holds panorama n.  While the robot moves, the way is planned
-    anew when a new map blocks it, or when the map changed and the plan is ``replan_period`` old
-    and the goal is not near.
-    A robot arrives facing the way it came, whatever its last small correction was, unless the
-    goal names a heading.  A terminal status and the empty path are views of one state.  Reasons of failure: the goal's
-    own, ``unreachable``, ``no free space within ... m``, ``stuck``, ``travel budget``.
+    anew when a new map blocks it, or when the map changed, the plan is ``replan_period`` old and
+    the goal is not near.  A robot arrives facing the way it came, whatever its last small
+    correction was, unless the goal names a heading.  A terminal status and the empty path are
+    views of one state.  Reasons of failure: the goal's own, ``unreachable``, ``no free space
+    within ... m``, ``stuck``, ``travel budget``.
 
     .. pydrake_system::
 

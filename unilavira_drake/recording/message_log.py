@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from unilavira_drake.messages.metrics import EpisodeMetrics
@@ -22,7 +22,7 @@ class MessageLog:
     again changes nothing, nor does a cloned Context that replays what was already seen.
     """
 
-    def __init__(self, *listeners: Listener) -> None:
+    def __init__(self, listeners: Sequence[Listener]) -> None:
         self._listeners = listeners
         self._seen: set[tuple[Any, ...]] = set()
 

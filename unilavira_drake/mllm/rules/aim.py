@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from unilavira_drake.mllm.rules.clauses import Clause
 from unilavira_drake.mllm.rules.plan import Step
-from unilavira_drake.mllm.rules.scene import angle_between
+from unilavira_drake.mllm.rules.sight import angle_between
 
 _SECTOR = 65.0
 """Within this angle of the wanted bearing a move takes a turn, degrees."""

@@ -9,7 +9,7 @@ from unilavira_drake.mllm.rules.aim import Aim, on_side, side_cost, turn_cost
 from unilavira_drake.mllm.rules.clauses import Clause
 from unilavira_drake.mllm.rules.memory import explored, is_hub
 from unilavira_drake.mllm.rules.option import Option, beside, tried_cost
-from unilavira_drake.mllm.rules.scene import Exit
+from unilavira_drake.mllm.rules.sight import Exit
 from unilavira_drake.mllm.rules.situation import Situation
 from unilavira_drake.mllm.rules.vocabulary import usual_rooms
 

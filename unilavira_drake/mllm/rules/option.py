@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from unilavira_drake.messages import VIEW_YAW
 from unilavira_drake.mllm.rules.clauses import Clause
-from unilavira_drake.mllm.rules.scene import Sight
+from unilavira_drake.mllm.rules.sight import Sight
 from unilavira_drake.mllm.rules.situation import Situation
 
 

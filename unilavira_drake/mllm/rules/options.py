@@ -10,7 +10,7 @@ from unilavira_drake.mllm.rules.aim import Aim, side_cost, turn_cost
 from unilavira_drake.mllm.rules.exit_options import exit_options
 from unilavira_drake.mllm.rules.memory import is_hub
 from unilavira_drake.mllm.rules.option import Option, beside, tried_cost
-from unilavira_drake.mllm.rules.scene import angle_between
+from unilavira_drake.mllm.rules.sight import angle_between
 from unilavira_drake.mllm.rules.situation import Situation
 
 _STEP = 3.5

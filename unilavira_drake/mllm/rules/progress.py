@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from unilavira_drake.mllm.rules.clauses import Clause
 from unilavira_drake.mllm.rules.memory import is_hub
 from unilavira_drake.mllm.rules.plan import Step
-from unilavira_drake.mllm.rules.scene import angle_between
+from unilavira_drake.mllm.rules.sight import angle_between
 from unilavira_drake.mllm.rules.situation import Situation
 
 NEAR_DOOR = 2.2

@@ -10,7 +10,8 @@ from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 from unilavira_drake.mllm.rules.clauses import Clause
 from unilavira_drake.mllm.rules.memory import Place, recall
 from unilavira_drake.mllm.rules.plan import Step, clauses_of, steps_from_history, steps_of
-from unilavira_drake.mllm.rules.scene import Scene, Sight, look
+from unilavira_drake.mllm.rules.scene import Scene, look
+from unilavira_drake.mllm.rules.sight import Sight
 
 REACH = 1.3
 """A thing whose nearest visible part is this close counts as reached, metres."""
