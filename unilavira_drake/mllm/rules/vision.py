@@ -22,6 +22,10 @@ from unilavira_drake.mllm.rules.vocabulary import (
 _ORDER = re.compile(r"Target: (.+?), about ([\d.]+) m, ([\d.]+) deg (left|right) of")
 _INSIDE = 1.2
 """How far behind a door the robot is to go, metres."""
+_FAR = 7.0
+"""A thing farther than this is near the end of the depth camera's range, metres ..."""
+_STRIDE = 5.0
+"""... and is approached over the floor first, metres."""
 _INSIDE_HUB = 0.8
 """The same for corridors, which are narrow."""
 
@@ -82,6 +86,9 @@ def _thing(view: ViewEvidence, name: str, distance: float, bearing: float) -> di
     if d.category == "door":
         middle, foot = (d.box[0] + d.box[2]) / 2, min(d.box[3], view.height - 1.0) - 2.0
         return _reply(name, "the floor in the opening", point=[middle, foot])
+    if d.distance > _FAR:
+        floor = _open_floor(view, _STRIDE, _degrees(view, (d.box[0] + d.box[2]) / 2))
+        return {**floor, "target_desc": f"floor towards the {name}"}
     return _reply(name, f"detection {d.id}", box=[*d.box])
 
 
