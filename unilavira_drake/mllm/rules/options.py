@@ -47,7 +47,7 @@ def _things(situation: Situation, aim: Aim) -> Iterator[Option]:
         sights = sorted(sights, key=lambda s: beside(s, goal.landmark, situation))
     elif goal.ordinal > 1 and len(sights) >= goal.ordinal:
         sights = sights[goal.ordinal - 1 :]
-    elif goal.ordinal == -1:
+    elif goal.ordinal == -1 or _towards_the_end(situation, aim):
         sights = sights[::-1]
     for rank, s in enumerate(sights):
         failure = 8.0 * tried_cost(situation, s.direction)
@@ -55,6 +55,11 @@ def _things(situation: Situation, aim: Aim) -> Iterator[Option]:
             -200.0 + 3.0 * rank + 0.1 * s.distance + failure + side_cost(goal.side, s.bearing, aim)
         )
         yield Option(s.direction, s.bearing, s.distance, s.name, cost, f"{s.name} in view", s.id)
+
+
+def _towards_the_end(situation: Situation, aim: Aim) -> bool:
+    """Whether the way still leads to the end of a corridor: then the farther of two is meant."""
+    return is_hub(situation.scene.room) and any(c.kind == "end" for c in aim.soft)
 
 
 def _passing(situation: Situation, aim: Aim) -> Iterator[Option]:

@@ -22,7 +22,7 @@ from unilavira_drake.mllm.rules.vocabulary import (
 _ORDER = re.compile(r"Target: (.+?), about ([\d.]+) m, ([\d.]+) deg (left|right) of")
 _INSIDE = 1.2
 """How far behind a door the robot is to go, metres."""
-_FAR = 7.0
+_FAR = 9.0
 """A thing farther than this is near the end of the depth camera's range, metres ..."""
 _STRIDE = 5.0
 """... and is approached over the floor first, metres."""
