@@ -46,6 +46,13 @@ class Bench:
     def pose(self, x, y, yaw=0.0):
         self.fix("cheat_X_WB", RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, y, 0.0]))
 
+    def act(self, n, call, tool, status="arrived", **fields):
+        """Shows a language action and how its goal goes."""
+        self.fix("language_action", LanguageAction(n=n, call=call, tool=tool, **fields))
+        self.fix("navigation_status", NavigationStatus(n, status))
+        self.tick()
+        self.tick()
+
     def tick(self):
         self.status = self.simulator.AdvanceTo(self.context.get_time() + PERIOD)
         return self.metrics
@@ -103,15 +110,26 @@ def test_a_stop_is_written_in_one_tick_and_ends_in_the_next():
 
 
 def test_only_decide_and_recover_are_decisions():
-    bench = Bench(decisions=2)
+    bench = Bench(decisions=3)
     calls = ("plan_todo", "decide", "double_check", "recover", "answer")
     for n, call in enumerate(calls, start=1):
-        bench.fix("language_action", LanguageAction(n=n, call=call, tool="stay"))
-        bench.tick()
-        bench.tick()
+        bench.act(n, call, "stay")
     assert bench.metrics.decisions == 2
     assert not bench.metrics.ended
-    bench.fix("language_action", LanguageAction(n=6, call="decide", tool="turn"))
+    bench.act(6, "decide", "turn")
+    assert bench.metrics.cause == "decision_budget"
+
+
+def test_the_last_decision_is_carried_out_and_its_stop_is_checked():
+    bench = Bench(decisions=1)
+    bench.act(1, "decide", "double_check")
+    assert not bench.metrics.ended
+    bench.act(2, "double_check", "stay", confirmed=False)
+    assert bench.metrics.cause == "decision_budget"
+    bench = Bench(decisions=1)
+    bench.act(1, "decide", "turn", status="moving")
+    assert not bench.metrics.ended
+    bench.fix("navigation_status", NavigationStatus(1, "arrived"))
     bench.tick()
     bench.tick()
     assert bench.metrics.cause == "decision_budget"

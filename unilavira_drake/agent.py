@@ -9,6 +9,7 @@ from pydrake.systems.framework import Diagram, System
 
 from unilavira_drake.language.system import Language
 from unilavira_drake.mapping.goal_selector import GoalSelector
+from unilavira_drake.memory.config import MemoryConfig
 from unilavira_drake.memory.todo_system import TodoMemory
 from unilavira_drake.memory.waypoint_system import WaypointMemory
 from unilavira_drake.messages import Frame
@@ -16,7 +17,6 @@ from unilavira_drake.mllm.broker import Broker
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.request import Mllm
 from unilavira_drake.model_link import Latency, ModelLink
-from unilavira_drake.scenario import MemoryConfig
 from unilavira_drake.vision.system import Vision
 from unilavira_drake.wiring import Wiring
 
@@ -38,6 +38,7 @@ def make_agent(
     tick: float,
     seed: int,
     can_climb: bool,
+    max_range: float,
     free_distance: Callable[[Frame], float],
     detector: Callable[[Frame], ViewEvidence],
     replace: MutableMapping[str, System] | None = None,
@@ -46,7 +47,7 @@ def make_agent(
 
     An ablation is wiring: without TDM ``todo_list`` stays unconnected, without SCB
     ``second_chance`` does.  The detector reaches a level only when its model declares
-    ``perception: ground_truth``.
+    ``perception: ground_truth``.  Targets beyond ``max_range`` (metres) are refused.
     """
     wiring = Wiring(replace)
 
@@ -84,7 +85,7 @@ def make_agent(
             merge_distance=memory.merge_distance,
         ),
     )
-    wiring.add("goal_selector", GoalSelector)
+    wiring.add("goal_selector", lambda: GoalSelector(max_range=max_range))
     wiring.connect("waypoint_memory", "history", "language")
     if ablation in ("full", "no_tdm"):
         wiring.connect("waypoint_memory", "second_chance", "language")

@@ -82,6 +82,7 @@ def make_navigation_diagram(
             tick=scenario.tick,
             seed=scenario.random_seed,
             can_climb=scenario.robot.can_climb,
+            max_range=scenario.robot.max_depth,
             free_distance=functools.partial(
                 free_distance,
                 min_height=scenario.mapping.min_height,

@@ -11,7 +11,13 @@ from pydrake.common.value import AbstractValue
 from pydrake.multibody.plant import ContactResults
 from pydrake.systems.framework import Context, EventStatus
 
-from unilavira_drake.messages import LanguageAction, Message, NavigationStatus, Panorama
+from unilavira_drake.messages import (
+    TERMINAL_STATES,
+    LanguageAction,
+    Message,
+    NavigationStatus,
+    Panorama,
+)
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.ports import InputReader, Level, message_input, pose_input
 from unilavira_drake.scenario import Budgets
@@ -98,7 +104,7 @@ class EpisodeMonitor(Level):
         action = self._action(context)
         new = self._follow_ring(context, self._follow_motion(context, state, time), action, time)
         new = self._follow_contacts(context, new)
-        cause = _cause(new.metrics, action, self._budgets, time)
+        cause = _cause(new, action, self._budgets, time)
         if new is state and not cause:
             return state
         return dataclasses.replace(
@@ -166,16 +172,23 @@ class EpisodeMonitor(Level):
         return dataclasses.replace(state, metrics=metrics, in_contact=touching)
 
 
-def _cause(metrics: EpisodeMetrics, action: LanguageAction, budgets: Budgets, time: float) -> str:
+def _cause(state: MonitorState, action: LanguageAction, budgets: Budgets, time: float) -> str:
     if action.tool == "stop":
         return "stopped"
-    if metrics.decisions > budgets.decisions:
+    if state.metrics.decisions >= budgets.decisions and _asks_again(state, action):
         return "decision_budget"
     if time >= budgets.simulated_time:
         return "time_budget"
-    if time - metrics.progress_time >= budgets.stall:
+    if time - state.metrics.progress_time >= budgets.stall:
         return "stalled"
     return ""
+
+
+def _asks_again(state: MonitorState, action: LanguageAction) -> bool:
+    """Whether the action is carried out, and what follows is a decision and no check of a stop."""
+    number, status = state.status
+    done = number == action.n and status in TERMINAL_STATES
+    return done and action.tool != "double_check" and not action.confirmed
 
 
 def _collision_force(contacts: ContactResults) -> float:

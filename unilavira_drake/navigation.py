@@ -7,15 +7,16 @@ from collections.abc import MutableMapping
 
 from pydrake.systems.framework import Diagram, System
 
+from unilavira_drake.mapping.config import MappingConfig
 from unilavira_drake.mapping.system import OccupancyMapper
 from unilavira_drake.messages import Intrinsics
+from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.planning.system import FastMarchingPlanner
 from unilavira_drake.robots.cobot_magic import CobotMagic
 from unilavira_drake.robots.drive_limits import DriveLimits, Reaction
 from unilavira_drake.robots.governor import Governor
 from unilavira_drake.robots.ground_controller import GroundTrackingController
 from unilavira_drake.robots.stopping import Footprint
-from unilavira_drake.scenario import MappingConfig, PlanningConfig
 from unilavira_drake.wiring import Wiring
 
 
@@ -43,7 +44,16 @@ def make_navigation(
     # A command reaches the wheels in the plant's next step and shows in the one after.
     reaction = Reaction(delay=2.0 * time_step)
     wiring.add("controller", lambda: GroundTrackingController(limits=limits, reaction=reaction))
-    wiring.add("governor", lambda: Governor(limits=limits, footprint=footprint, offset=time_step))
+    wiring.add(
+        "governor",
+        # At rest the map is renewed once per rest period; half a period more is a late map.
+        lambda: Governor(
+            limits=limits,
+            footprint=footprint,
+            offset=time_step,
+            map_timeout=1.5 * mapping.rest_period,
+        ),
+    )
     wiring.connect("mapper", "map", "planner")
     wiring.connect("mapper", "map", "governor")
     wiring.connect("planner", "path", "controller")

@@ -8,10 +8,11 @@ import dataclasses as dc
 
 from pydrake.multibody.plant import MultibodyPlantConfig
 
+from unilavira_drake.mapping.config import MappingConfig
+from unilavira_drake.memory.config import MemoryConfig
 from unilavira_drake.mllm.latency import ConstantLatency, LognormalLatency, NoLatency
+from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.robots.cobot_magic import CobotMagic
-
-SCHEMA_VERSION = 1
 
 # What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both.
 ABLATIONS = ("full", "no_tdm", "no_scb", "no_both")
@@ -63,53 +64,6 @@ class Budgets:
     simulated_time: float = 1800.0
     # Simulated seconds without any progress of the ring.
     stall: float = 600.0
-
-
-@dc.dataclass
-class MappingConfig:
-    """The occupancy map and when it is updated."""
-
-    # Side of a cell, metres.
-    resolution: float = 0.05
-    # Depth is integrated up to this range, metres.
-    max_range: float = 5.0
-    # Heights above the floor that count as obstacles, metres.
-    min_height: float = 0.10
-    max_height: float = 1.40
-    # Every so many rows and columns of a depth image; 3 pixels at 5 m are less than a cell.
-    stride: int = 3
-    # Update after this much travel (metres) or turning (degrees); at rest this often (seconds).
-    travel: float = 0.2
-    turn_degrees: float = 20.0
-    rest_period: float = 2.0
-
-
-@dc.dataclass
-class PlanningConfig:
-    """Goal snapping, progress watch and travel budget."""
-
-    # A goal moves at most this far to reachable free space, metres.
-    snap_distance: float = 1.5
-    # Arrived within this distance of the goal, metres.
-    tolerance: float = 0.10
-    # Stuck after this long without progress, seconds.
-    stuck_time: float = 6.0
-    # Gives up after travelling this many times the planned length, plus 3 m.
-    travel_factor: float = 3.0
-
-
-@dc.dataclass
-class MemoryConfig:
-    """Bounds of what the agent remembers."""
-
-    waypoints: int = 32
-    # Decisions told in the history.
-    decisions: int = 8
-    # Egocentric key frames of one leg, and the travel between two of them, metres.
-    keyframes: int = 6
-    keyframe_travel: float = 1.5
-    # A place closer than this to a waypoint is that waypoint, metres.
-    merge_distance: float = 0.5
 
 
 @dc.dataclass

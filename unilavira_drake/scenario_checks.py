@@ -35,6 +35,12 @@ _RULES: dict[str, _Rule] = {
     "vision_latency.sigma": _NOT_NEGATIVE,
     "mapping.min_height": _NOT_NEGATIVE,
     "planning.snap_distance": _NOT_NEGATIVE,
+    "memory.waypoints": ("at least 2", lambda v: v >= 2),
+    "mapping.resolution": ("0.01 to 0.5", lambda v: 0.01 <= v <= 0.5),
+    "mapping.stride": ("1 to 16", lambda v: 1 <= v <= 16),
+    "planning.tolerance": ("0.01 to 1", lambda v: 0.01 <= v <= 1),
+    "robot.length": ("0.1 to 3", lambda v: 0.1 <= v <= 3),
+    "robot.width": ("0.1 to 3", lambda v: 0.1 <= v <= 3),
     "memory.decisions": _NOT_NEGATIVE,
     "memory.keyframes": _NOT_NEGATIVE,
     "memory.merge_distance": _NOT_NEGATIVE,
@@ -122,7 +128,7 @@ def _check_plant(scenario: Scenario) -> None:
         )
     try:
         AddMultibodyPlant(scenario.plant, DiagramBuilder())
-    except RuntimeError as error:
+    except (RuntimeError, SystemExit) as error:
         raise ScenarioError(f"plant: Drake refuses it: {error}") from None
 
 

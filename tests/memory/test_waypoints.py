@@ -119,3 +119,36 @@ def test_caption_is_at_most_160_characters() -> None:
     state = step(WaypointState(), panorama(1, 0, 0))
     state = step(state, panorama(2, 3, 0), turn(1, "front", scene="x" * 400))
     assert len(state.history.waypoints[0].caption) == 160
+
+
+def test_a_way_that_got_stuck_half_way_is_the_one_that_failed() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    state = step(state, panorama(2, 3, 0), turn(1, "left"))
+    back = LanguageAction(n=2, call="decide", tool="backtrack", waypoint=1)
+    state = step(state, panorama(3, 0, 0), back)
+    assert state.second_chance.failed_direction == "left"
+    state = WaypointState(**{**vars(state), "frames": (b"to the right",)})
+    stuck = panorama(4, 2, -2, outcome=Outcome("failed", "stuck"))
+    state = step(state, stuck, turn(3, "right"))
+    back = LanguageAction(n=4, call="decide", tool="backtrack", waypoint=1)
+    state = step(state, panorama(5, 0, 0), back)
+    assert state.second_chance.failed_direction == "right"
+    assert state.second_chance.failed_frames == (b"to the right",)
+    assert [e.outcome for e in state.history.edges] == ["returned", "failed: stuck"]
+
+
+def test_an_arrived_backtrack_is_at_its_waypoint_even_if_the_goal_moved_a_little() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    state = step(state, panorama(2, 3, 0), turn(1, "front"))
+    back = LanguageAction(n=2, call="decide", tool="backtrack", waypoint=1)
+    state = step(state, panorama(3, 0.7, 0), back)
+    assert state.history.current == 1
+    assert state.second_chance.failed_direction == "front"
+
+
+def test_edges_of_evicted_waypoints_are_forgotten() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    for n in range(2, 12):
+        state = step(state, panorama(n, 3.0 * n, 0), turn(n - 1, "front"))
+    kept = {w.id for w in state.history.waypoints}
+    assert {e.waypoint for e in state.history.edges} <= kept

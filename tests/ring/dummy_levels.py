@@ -18,6 +18,7 @@ from pydrake.systems.primitives import ConstantValueSource
 from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I, ImageRgba8U
 
 from unilavira_drake.agent import ModelChoice, make_agent
+from unilavira_drake.memory.config import MemoryConfig
 from unilavira_drake.messages import (
     Goal,
     Intrinsics,
@@ -29,7 +30,6 @@ from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.latency import ConstantLatency
 from unilavira_drake.mllm.request import Completion, MllmRequest
 from unilavira_drake.ports import Level, message_input
-from unilavira_drake.scenario import MemoryConfig
 from unilavira_drake.sensors.observer import Observer
 from unilavira_drake.tasks import TaskSpec
 from unilavira_drake.wiring import Wiring
@@ -206,6 +206,7 @@ def make_ring(
             tick=0.1,
             seed=0,
             can_climb=True,
+            max_range=10.0,
             free_distance=lambda frame: WALL_DISTANCE,
             detector=lambda frame: ViewEvidence(frame.view),
             replace=own,

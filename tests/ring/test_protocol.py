@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from dummy_levels import (
@@ -20,6 +22,7 @@ from unilavira_drake.language.system import Language
 from unilavira_drake.memory.todo_system import TodoMemory
 from unilavira_drake.memory.waypoint_system import WaypointMemory
 from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.tasks import TaskSpec
 from unilavira_drake.vision.system import Vision
 
 DONE = {"op": "update", "index": 1, "status": "completed", "result": "door behind me"}
@@ -182,7 +185,7 @@ def test_calls_do_not_depend_on_the_periods_of_the_levels() -> None:
     run_until_stop(make_ring(language, vision, failures=FAILURES))
     expected = [(r.n, r.attempt, r.call, r.variables) for r in language.requests]
     rng = np.random.default_rng(0)
-    for _ in range(5):
+    for _ in range(20):
         periods = rng.choice([0.05, 0.1, 0.15, 0.2, 0.35], size=6)
         language, vision = scripted()
         replace = {
@@ -201,7 +204,12 @@ def test_calls_do_not_depend_on_the_periods_of_the_levels() -> None:
             ),
         }
         diagram = make_ring(
-            language, vision, failures=FAILURES, replace=replace, observer_period=periods[4]
+            language,
+            vision,
+            failures=FAILURES,
+            replace=replace,
+            observer_period=periods[4],
+            body_period=periods[5],
         )
         run_until_stop(diagram)
         assert [(r.n, r.attempt, r.call, r.variables) for r in language.requests] == expected
@@ -233,3 +241,10 @@ def test_evidence_reaches_only_a_model_declared_ground_truth() -> None:
         assert (given is not None) == (perception == "ground_truth")
         assert given is None or given[0] == ViewEvidence("front")
         assert vision.requests[0].evidence is None
+
+
+def test_the_goal_of_the_episode_has_no_way_into_the_agent() -> None:
+    agent = make_ring(*scripted()).GetSubsystemByName("agent")
+    ports = {agent.get_input_port(i).get_name() for i in range(agent.num_input_ports())}
+    assert ports == {"task", "panorama", "front.color_image", "pose_estimate"}
+    assert [field.name for field in dataclasses.fields(TaskSpec)] == ["family", "text"]

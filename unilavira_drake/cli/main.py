@@ -40,7 +40,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         app(args=None if arguments is None else list(arguments), prog_name="unilavira")
     except SystemExit as done:
-        return done.code if isinstance(done.code, int) else int(done.code is not None)
+        if isinstance(done.code, str):  # Drake's assertions arrive like this.
+            return _failed(done, BAD_INPUT)
+        return done.code or 0
     except InputError as error:
         return _failed(error, BAD_INPUT)
     except InfrastructureError as error:
@@ -48,6 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _failed(error: Exception, code: int) -> int:
+def _failed(error: BaseException, code: int) -> int:
     print(f"unilavira: {error}", file=sys.stderr)
     return code

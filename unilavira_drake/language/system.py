@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context
 
 from unilavira_drake.errors import ReplyFormatError
 from unilavira_drake.language.next_call import next_call
-from unilavira_drake.language.reply import parse_language_reply
+from unilavira_drake.language.reply import CONTENT_LIMIT, parse_language_reply
 from unilavira_drake.language.variables import language_request
 from unilavira_drake.messages import (
     Frame,
@@ -149,7 +149,7 @@ def safe_action(request: MllmRequest, problem: str) -> LanguageAction:
     )
     if request.call == "plan_todo":
         assert isinstance(request.variables, LanguageVariables)
-        whole_task = TodoUpdate(op="add", content=request.variables.task)
+        whole_task = TodoUpdate(op="add", content=request.variables.task[:CONTENT_LIMIT])
         return dataclasses.replace(action, tool="stay", todo_updates=(whole_task,))
     if request.call == "double_check":
         return dataclasses.replace(action, tool="stay", confirmed=False)

@@ -69,7 +69,9 @@ def language_request(
         ),
         decisions=tuple(DecisionNote(d.n, decision_text(d)) for d in history.decisions),
         second_chance=second_chance is not None,
-        failed_edges=() if second_chance is None else _failed_edges(second_chance),
+        failed_edges=()
+        if second_chance is None
+        else _failed_edges(second_chance, history, panorama),
         failed_direction="" if second_chance is None else second_chance.failed_direction,
         can_climb=can_climb,
     )
@@ -118,7 +120,7 @@ def _waypoint_note(
 ) -> WaypointNote:
     x, y, _ = panorama.position
     dx, dy = waypoint.position[0] - x, waypoint.position[1] - y
-    front = panorama.yaw if waypoint.id == history.current else waypoint.heading
+    front = _front(waypoint, panorama, history)
     return WaypointNote(
         id=waypoint.id,
         distance=round(math.hypot(dx, dy), 2),
@@ -126,7 +128,10 @@ def _waypoint_note(
         heading=_degrees(waypoint.heading - panorama.yaw),
         caption=waypoint.caption,
         tried=tuple(
-            _edge_text(edge, front) for edge in history.edges if edge.waypoint == waypoint.id
+            _edge_text(edge, front)
+            for edge in history.edges
+            if edge.waypoint == waypoint.id
+            and (second_chance is not None or edge.outcome == "arrived")
         ),
         offered=second_chance is not None and waypoint.id in second_chance.offers,
     )
@@ -137,11 +142,21 @@ def _edge_text(edge: Edge, front: float) -> str:
     return f"{direction_of(edge.bearing - front)}: {edge.outcome}{target}"
 
 
-def _failed_edges(second_chance: SecondChance) -> tuple[str, ...]:
-    return tuple(
-        f"waypoint {edge.waypoint}, {edge.direction}: {edge.outcome}"
-        for edge in second_chance.failed_edges
-    )
+def _failed_edges(
+    second_chance: SecondChance, history: History, panorama: Panorama
+) -> tuple[str, ...]:
+    texts = []
+    for edge in second_chance.failed_edges:
+        waypoint = history.waypoint(edge.waypoint)
+        if waypoint is not None:
+            text = _edge_text(edge, _front(waypoint, panorama, history))
+            texts.append(f"waypoint {edge.waypoint}, {text}")
+    return tuple(texts)
+
+
+def _front(waypoint: Waypoint, panorama: Panorama, history: History) -> float:
+    """Returns the world yaw to which the four words refer at a waypoint, radians."""
+    return panorama.yaw if waypoint.id == history.current else waypoint.heading
 
 
 def _images(

@@ -83,22 +83,29 @@ def remember(
         dataclasses.replace(w, scene=action.scene) if w.id == old.current and action.scene else w
         for w in old.waypoints
     )
-    current, waypoints, next_id = _place(state, waypoints, panorama, target, thumbnail, bounds)
-    edges = old.edges
+    back = action.tool == "backtrack" and panorama.outcome.state == "arrived"
+    if back and action.waypoint is not None and old.waypoint(action.waypoint) is not None:
+        # Room to turn may have moved the goal a little; the place is the one that was meant.
+        current, next_id = action.waypoint, state.next_id
+    else:
+        current, waypoints, next_id = _place(state, waypoints, panorama, target, thumbnail, bounds)
+    kept = {waypoint.id for waypoint in waypoints}
+    edges = tuple(edge for edge in old.edges if edge.waypoint in kept)
     if action.tool == "turn":
         bearing = state.yaw + VIEW_YAW[action.direction]
         to = current if panorama.outcome.state == "arrived" and current != old.current else None
         edges += (Edge(old.current, action.direction, bearing, action.n, outcome, to),)
     legs = (*state.legs, Leg(action.n, state.frames))[-bounds.waypoints :]
     returned = None
-    if action.tool == "backtrack" and panorama.outcome.state == "arrived":
-        edges, returned = _mark_returned(edges, current)
+    if back:
+        edges, returned = _mark_returned(edges, current, action.n)
     decisions = old.decisions
     if action.n:
         record = DecisionRecord(
             action.n, action.call, action.tool, action.argument, old.current, target, outcome
         )
-        decisions = (*decisions, record)[-bounds.decisions :]
+        decisions = (*decisions, record)
+        decisions = decisions[max(0, len(decisions) - bounds.decisions) :]
     n = panorama.n
     history = History(n, current, waypoints, edges, decisions, _spread(state.frames, bounds))
     second_chance = SecondChance(
@@ -146,12 +153,19 @@ def _place(
     return added.id, (*waypoints, added), state.next_id + 1
 
 
-def _mark_returned(edges: tuple[Edge, ...], place: int) -> tuple[tuple[Edge, ...], Edge | None]:
-    """Marks the edge by which ``place`` was last left as failed; returns it, too."""
+def _mark_returned(
+    edges: tuple[Edge, ...], place: int, backtrack: int
+) -> tuple[tuple[Edge, ...], Edge | None]:
+    """Marks the edge by which ``place`` was last left as failed; returns it, too.
+
+    A way that ended half-way (stuck) was left as well; its own failure stays its outcome.
+    """
     for i in reversed(range(len(edges))):
-        if edges[i].waypoint == place and edges[i].to is not None:
-            returned = dataclasses.replace(edges[i], outcome="returned")
-            return (*edges[:i], returned, *edges[i + 1 :]), returned
+        edge = edges[i]
+        if edge.waypoint == place and edge.n < backtrack:
+            if edge.outcome == "arrived":
+                edge = dataclasses.replace(edge, outcome="returned")
+            return (*edges[:i], edge, *edges[i + 1 :]), edge
     return edges, None
 
 

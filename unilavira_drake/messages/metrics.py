@@ -10,7 +10,7 @@ from unilavira_drake.messages.frozen import Message
 
 CAUSES = {
     "stopped": "The agent ended the episode by its own verified stop.",
-    "decision_budget": "The agent asked for one more decision than the budget allows.",
+    "decision_budget": "The decisions of the budget are used up, and the last one is carried out.",
     "time_budget": "The simulated time of the budget is over.",
     "stalled": "For the stall time no panorama, action, status or motion was new.",
     "interrupted": "A person stopped the run; what was done until then is kept.",

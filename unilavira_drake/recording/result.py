@@ -82,7 +82,7 @@ class EpisodeResult:
     scored: bool = False
     success: bool | None = None
     cause: str = ""
-    """Why the episode ended; one of ``unilavira_drake.episode_monitor``'s causes."""
+    """Why the episode ended; a key of ``messages.metrics.CAUSES``."""
     task: TaskResult = TaskResult()
     scenario: str = ""
     robot: str = ""

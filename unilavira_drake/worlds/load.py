@@ -52,10 +52,12 @@ def _find(name_or_file: str) -> Path:
 
 
 def _read(path: Path) -> WorldFile:
-    text = path.read_text(encoding="utf-8")
     try:
+        text = path.read_text(encoding="utf-8")
         data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: cannot be read: {error}.") from None
+    except (yaml.YAMLError, ValueError) as error:
         raise ScenarioError(f"{path}: not valid YAML: {error}") from None
     if not isinstance(data, dict):
         raise ScenarioError(f"{path}: expected keys such as 'rooms' and 'objects' at the top.")
@@ -117,6 +119,12 @@ def _build(entries: WorldFile, place: str) -> World:
     rooms = tuple(_room(entry, f"{place}: rooms: {entry.name!r}") for entry in entries.rooms)
     if not rooms:
         raise ScenarioError(f"{place}: rooms: empty; a world needs at least one room.")
+    for key, size, low, high in (
+        ("wall_height", entries.wall_height, 2.2, 20.0),
+        ("wall_thickness", entries.wall_thickness, 0.02, 1.0),
+    ):
+        if not low <= size <= high:
+            raise ScenarioError(f"{place}: {key}: {size} is not usable; give {low} to {high} m.")
     _unique((*entries.rooms, *entries.doors, *entries.objects), place)
     by_name = {room.name: room for room in rooms}
     things = tuple(_thing(entry, by_name, place) for entry in entries.objects)

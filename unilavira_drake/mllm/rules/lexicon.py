@@ -107,7 +107,6 @@ _COURTESY = frozenset(
         "be",
         "been",
         "do",
-        "not",
         "which",
         "who",
         "where",
@@ -152,6 +151,14 @@ _COURTESY = frozenset(
 )
 
 
+_NEGATED = re.compile(
+    r"\b(?:do not|dont|don.t|must not|should not|never|not|avoid|without)\b"
+    r"(?:(?!\b(?:but|instead|then)\b)[^.,;:!?])*",
+    re.IGNORECASE,
+)
+"""What is not to be done, to the end of its part of the sentence."""
+
+
 def words_of(text: str) -> list[str]:
     """Returns lower-case words and sentence marks; hyphens and contractions are opened."""
     text = text.lower().replace("’", "'")
@@ -162,8 +169,11 @@ def words_of(text: str) -> list[str]:
 
 
 def tokenize(text: str) -> list[Token]:
-    """Returns the text as tokens; words outside the lexicon become ``word`` tokens."""
-    words = words_of(text)
+    """Returns the text as tokens; words outside the lexicon become ``word`` tokens.
+
+    What is not to be done is left out: the plan knows no prohibitions.
+    """
+    words = words_of(_NEGATED.sub(" ", text))
     tokens: list[Token] = []
     i = 0
     while i < len(words):
@@ -180,7 +190,9 @@ def tokenize(text: str) -> list[Token]:
 def unused_words(text: str) -> tuple[str, ...]:
     """Returns the words of an instruction that the parser cannot use, in order, once each."""
     unknown = (token.text for token in tokenize(text) if token.kind == "word")
-    return tuple(dict.fromkeys(word for word in unknown if word not in _COURTESY))
+    negated = (" ".join(found.split()) for found in _NEGATED.findall(text))
+    words = (word for word in unknown if word not in _COURTESY)
+    return tuple(dict.fromkeys((*negated, *words)))
 
 
 def is_courtesy(word: str) -> bool:

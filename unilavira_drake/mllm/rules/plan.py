@@ -12,6 +12,8 @@ from unilavira_drake.mllm.rules.memory import Place
 from unilavira_drake.mllm.rules.parser import parse
 
 MAX_ITEMS = 30
+LONGEST_ITEM = 200
+"""Characters that a TODO item may have."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ def clauses_of(task: str, family: str, room: str) -> tuple[Clause, ...]:
 
 def items_of(clauses: Sequence[Clause]) -> list[str]:
     """Returns the TODO items of a plan."""
-    return [describe(clause) for clause in clauses]
+    return [describe(clause)[:LONGEST_ITEM] for clause in clauses]
 
 
 def steps_of(todo: Sequence[TodoItem]) -> list[Step]:
