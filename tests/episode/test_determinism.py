@@ -71,7 +71,7 @@ def test_a_cloned_context_has_the_same_future_without_extra_calls(time: float) -
 
     def listen(t: float, system: str, event: str, message: Any) -> None:
         if message is not None and getattr(message, "n", 0):
-            seen.append(transcript_line(t, system, event, message, {}))
+            seen.append(transcript_line(t, 0, system, event, message, {}))
 
     scenario = load_scenario("flat", LATENCY + "budgets: {decisions: 20}\n")
     diagram = make_navigation_diagram(scenario, on_message=listen)
