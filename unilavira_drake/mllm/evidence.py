@@ -28,9 +28,9 @@ class Detection(Message):
     pixels: int = 0
     """How many pixels are visible."""
     distance: float = 0.0
-    """Median range along the floor from the robot, metres."""
+    """Median range along the floor from the camera, metres."""
     point_distance: float = 0.0
-    """Range along the floor from the robot to ``point``, metres."""
+    """Range along the floor from the camera to ``point``, metres."""
 
 
 @dataclass(frozen=True)
