@@ -8,6 +8,7 @@ of ``front``, distances metres.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import json
 from dataclasses import dataclass
@@ -119,7 +120,7 @@ class MllmRequest(Message):
     feedback: str = ""
     """On a re-ask: what was wrong with the reply to the previous attempt."""
 
-    @property
+    @functools.cached_property
     def digest(self) -> str:
         """SHA-256 of the content; images count by their own hash."""
         return hashlib.sha256(json.dumps(_plain(self), sort_keys=True).encode()).hexdigest()

@@ -25,9 +25,14 @@ class MessageLog:
     def __init__(self, listeners: Sequence[Listener]) -> None:
         self._listeners = listeners
         self._seen: set[tuple[Any, ...]] = set()
+        self._latest: dict[tuple[str, str], Any] = {}
 
     def __call__(self, t: float, system: str, event: str, message: Any) -> None:
         """Takes what stands on a port at a time, simulated seconds."""
+        # Nearly always nothing is new, ten times a second for each port.
+        if self._latest.get((system, event)) is message:
+            return
+        self._latest[system, event] = message
         key = (system, event, _identity(message))
         if key in self._seen:
             return

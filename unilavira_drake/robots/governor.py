@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
@@ -77,11 +78,12 @@ class Governor(LeafSystem):
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         limits = self._limits
-        desired_speed, _, desired_rate, t_issued = self._desired(context)
+        desired_speed, _, desired_rate, t_issued = self._desired(context).tolist()
         fresh = abs(context.get_time() - t_issued) <= self._command_timeout
         if not (fresh and math.isfinite(desired_speed) and math.isfinite(desired_rate)):
             desired_speed = desired_rate = 0.0
-        old_speed, _, old_rate = context.get_discrete_state(self._command_index).value()
+        old: Any = context.get_discrete_state(self._command_index).value()
+        old_speed, _, old_rate = old.tolist()
         if desired_speed == desired_rate == old_speed == old_rate == 0.0:
             return
         step = limits.max_acceleration * limits.period

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
@@ -57,7 +58,8 @@ class GroundTrackingController(LeafSystem):
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         limits = self._limits
-        speed, _, rate, _ = context.get_discrete_state(self._command_index).value()
+        previous: Any = context.get_discrete_state(self._command_index).value()
+        speed, _, rate, _ = previous.tolist()
         path = self._path(context)
         sweep = self._sweep(context)
         follow = len(path.p_WP) > 0 and path.n >= sweep.n
