@@ -60,7 +60,7 @@ def make_navigation_diagram(
     own = dict(replace or {})
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
     task = choose_task(scenario)
-    start = parse_start(task.start, world, radius=scenario.robot.radius)
+    start = parse_start(task.start, world, radius=scenario.robot.turning_radius)
     intrinsics = front_intrinsics(scenario.robot)
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))

@@ -55,9 +55,10 @@ def run_episode(
     """
     task = choose_task(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
-    radius = scenario.robot.radius
-    start = parse_start(task.start, world, radius=radius)
-    goal = make_goal_field(task.goal, world, radius=radius) if task.goal else None
+    start = parse_start(task.start, world, radius=scenario.robot.turning_radius)
+    goal = None
+    if task.goal:
+        goal = make_goal_field(task.goal, world, radius=scenario.robot.radius)
     if goal is not None:
         shortest_path(goal, *start[:2])
     tally, trace = Tally(), EpisodeTrace()

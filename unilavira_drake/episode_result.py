@@ -42,6 +42,8 @@ def episode_result(
             shortest_path_m=verdict.shortest_path_m,
             spl=verdict.spl,
             oracle_success=verdict.oracle_success,
+            same_room=verdict.same_room,
+            goal_seen=verdict.goal_seen,
             success_3m=verdict.success_3m,
             collisions=metrics.collisions,
             max_contact_force_n=round(metrics.max_contact_force, 3),

@@ -76,7 +76,7 @@ def validate(scenario: Scenario) -> None:
     _check_periods(scenario)
     _check_tasks(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
-    parse_start(choose_task(scenario).start, world, radius=scenario.robot.radius)
+    parse_start(choose_task(scenario).start, world, radius=scenario.robot.turning_radius)
 
 
 def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:

@@ -91,7 +91,9 @@ def make_navigation_station(
     if world is None:
         world = load_world(scenario.world.name, mirror=scenario.world.mirror)
     if start is None:
-        start = parse_start(choose_task(scenario).start, world, radius=scenario.robot.radius)
+        start = parse_start(
+            choose_task(scenario).start, world, radius=scenario.robot.turning_radius
+        )
     builder = DiagramBuilder()
     plant, scene_graph, robot = _add_scene(builder, scenario, world)
     q: Any = np.array(start)

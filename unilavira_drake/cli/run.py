@@ -80,6 +80,9 @@ def run(
         "renderer": renderer,
         "meshcat": meshcat or None,
     }
+    if task is not None:
+        # A saved scenario's goal and start belong to the task that it was saved with.
+        flags["task.goal"], flags["task.start"] = goal or "", start or ""
     loaded = load_scenario(scenario, _overlay(flags, setting or []))
     check_rendering()
     if out is not None:

@@ -45,6 +45,8 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
     metrics, counts = result.metrics, result.counts
     rows = [
         ("navigation error", _metres(metrics.navigation_error_m)),
+        ("in the goal's room", _YES_NO[metrics.same_room]),
+        ("goal in the last view", _YES_NO[metrics.goal_seen]),
         ("stopped within 3 m", _YES_NO[metrics.success_3m]),
         ("path length", _metres(metrics.path_length_m)),
         ("shortest path", _metres(metrics.shortest_path_m)),

@@ -18,6 +18,9 @@ BESIDE = 0.25
 """A target no farther than the turning radius and this much is beside the robot: it may stay
 where it is.  For any other target the snapped goal is at least this far from it, metres."""
 
+TIGHT = 0.87
+"""Where less than this share of the turning radius is free, the robot would not come out again."""
+
 SURFACE = 0.5
 """The front of a thing is looked for up to this far before the selected point, metres."""
 
@@ -43,7 +46,7 @@ def snap(
     """Returns the cell where the robot should stop for a target.
 
     Preferred, in this order, and then by distance to the target: known free cells in view of the
-    target's front with room to turn; such cells without room to turn; unknown cells in view on
+    target's front with room to turn; such cells with just enough; unknown cells in view on
     the robot's side (a target beyond the mapped range); known cells behind something.
 
     Args:
@@ -108,6 +111,8 @@ def _search(
             if not reachable[i, j] or from_robot < apart:
                 continue
             if not known and from_robot >= to_robot:
+                continue
+            if known and clearance[i, j] < TIGHT * turning_radius:
                 continue
             # Of two cells as near to the target, the one nearer to where it was seen from.
             key = distance + 1e-3 * math.hypot(cx - points[4], cy - points[5])

@@ -10,7 +10,7 @@ from unilavira_drake.messages.metrics import EpisodeMetrics
 Listener = Callable[[float, str, str, Any], None]
 """Called with simulated seconds, system, event and message."""
 
-METRICS_TRAVEL = 0.1
+METRICS_TRAVEL = 0.25
 """Metrics are new after this much travel, metres."""
 
 

@@ -47,6 +47,10 @@ class MetricsResult:
     shortest_path_m: float | None = None
     spl: float | None = None
     oracle_success: bool | None = None
+    same_room: bool | None = None
+    """Whether the robot ended in the goal's room."""
+    goal_seen: bool | None = None
+    """Whether the goal instance is in the last panorama."""
     success_3m: bool | None = None
     """Stopped within 3 m, the radius common in the literature; beside the stricter success."""
     collisions: int = 0

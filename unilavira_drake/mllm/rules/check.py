@@ -23,7 +23,8 @@ def double_check(situation: Situation) -> dict[str, Any]:
         return {"reasoning": reason, "confirmed": False, "reason": reason}
     last = situation.steps[-1].clause if situation.steps else None
     if last is None:
-        return _confirmed("no step could be read from the task", situation.scene.room_id)
+        reason = "no step of the task was understood, so nothing shows that it is done"
+        return {"reasoning": reason, "confirmed": False, "reason": reason}
     if last.category and last.kind in ("go", "stop"):
         sight = situation.reached(last)
         if sight is None:

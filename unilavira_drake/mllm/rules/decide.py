@@ -41,7 +41,11 @@ def decide(situation: Situation) -> dict[str, Any]:
     if all(step.clause.kind in ("turn", "straight") for step in progress.pending):
         # All views are in sight anyway: a turn that nothing follows moves nothing.
         updates += [{"op": "remove", "index": step.index} for step in progress.pending]
-        reply["reasoning_action"] = "Every step is done and the target is here: check and stop."
+        reply["reasoning_action"] = (
+            "Every step is done and the target is here: check and stop."
+            if progress.steps
+            else "No step of the task was understood; nothing can be done."
+        )
         return _without_list(reply, situation)
     reopened = [s for s in progress.pending if _was_done(s, situation)]
     updates += [

@@ -26,6 +26,8 @@ _FAR = 9.0
 """A thing farther than this is near the end of the depth camera's range, metres ..."""
 _STRIDE = 5.0
 """... and is approached over the floor first, metres."""
+_FILLED = 0.6
+"""A thing that fills less of its box than this is pointed at."""
 _INSIDE_HUB = 0.8
 """The same for corridors, which are narrow."""
 
@@ -89,6 +91,10 @@ def _thing(view: ViewEvidence, name: str, distance: float, bearing: float) -> di
     if d.distance > _FAR:
         floor = _open_floor(view, _STRIDE, _degrees(view, (d.box[0] + d.box[2]) / 2))
         return {**floor, "target_desc": f"floor towards the {name}"}
+    area = (d.box[2] - d.box[0]) * (d.box[3] - d.box[1])
+    if d.pixels < _FILLED * area:
+        # Most of the box shows what is behind a thin thing.
+        return _reply(name, f"detection {d.id}", point=[*d.point])
     return _reply(name, f"detection {d.id}", box=[*d.box])
 
 
