@@ -129,6 +129,15 @@ def test_recover_names_the_failed_direction(shown: ScriptedModel) -> None:
     assert any(image.label.startswith("failed leg") for image in recover.images)
 
 
+def test_pictures_of_the_places_to_go_back_to_are_shown(shown: ScriptedModel) -> None:
+    labels = [image.label for image in shown.request(6).images]
+    offered = [w.id for w in shown.request(6).variables.waypoints if w.offered]
+    assert offered
+    assert [label for label in labels if label.startswith("waypoint")] == [
+        f"waypoint {waypoint}" for waypoint in offered
+    ]
+
+
 def test_rejected_stop_is_fed_back(shown: ScriptedModel) -> None:
     assert shown.request(12).variables.rejection == "table not seen"
     assert shown.request(11).variables.rejection == ""

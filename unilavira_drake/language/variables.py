@@ -163,6 +163,12 @@ def _images(
     panorama: Panorama, history: History, second_chance: SecondChance | None
 ) -> tuple[ImagePart, ...]:
     views = tuple(ImagePart(f"view {d}", panorama.frame(d).jpeg) for d in DIRECTIONS)
+    offers = () if second_chance is None else second_chance.offers
+    places = tuple(
+        ImagePart(f"waypoint {waypoint.id}", waypoint.thumbnail)
+        for waypoint in history.waypoints
+        if waypoint.id in offers and waypoint.thumbnail
+    )
     leg = tuple(
         ImagePart(f"on the way here, {i + 1} of {len(history.keyframes)}", jpeg)
         for i, jpeg in enumerate(history.keyframes)
@@ -171,4 +177,4 @@ def _images(
     failed = tuple(
         ImagePart(f"failed leg, {i + 1} of {len(frames)}", jpeg) for i, jpeg in enumerate(frames)
     )
-    return leg + failed + views
+    return places + leg + failed + views
