@@ -48,4 +48,6 @@ def test_mirrored_world_and_words_give_the_mirrored_path(name: str) -> None:
     assert mirrored_success
     assert mirrored_words == [exchange(word) for word in words]
     # Not exact: in both worlds the robot looks around turning to its left.
-    assert np.abs(mirrored_places * [1.0, -1.0] - places).max() < 0.5
+    gaps = np.abs(mirrored_places * [1.0, -1.0] - places).max(axis=1)
+    assert np.median(gaps) < 0.25
+    assert gaps.max() < 0.75

@@ -221,14 +221,19 @@ def test_vision_returns_the_box_of_the_thing_and_the_floor_of_a_place():
         return json.loads(MODEL.complete(asked).text)
 
     order = "Target: red sofa, about 5.0 m, 24 deg right of the left view's axis."
-    assert ground(order)["box"] == list(view.detections[2].box)
+    # It fills less than half of its box: a point on it is surer than the box.
+    assert ground(order)["point"] == list(view.detections[2].point)
+    u_min, v_min, u_max, v_max = view.detections[2].box
+    full = dataclasses.replace(view.detections[2], pixels=int((u_max - u_min) * (v_max - v_min)))
+    view = dataclasses.replace(view, detections=(*view.detections[:2], full))
+    assert ground(order)["box"] == list(full.box)
     reply = ground("Target: open floor, about 3.0 m, 0 deg left of the left view's axis.")
     u, v = reply["point"]
     assert CAMERA.reach(u, v) == pytest.approx(3.0, rel=0.02)
     reply = ground("Target: blue sofa, about 3.0 m, 0 deg left of the left view's axis.")
     assert reply["box"] is None
     assert "blue sofa" in reply["reason"]
-    assert ground("I would walk over to the settee.")["box"] is not None
+    assert ground("I would walk over to the settee.")["target_desc"] == "red sofa"
 
 
 def test_a_request_without_evidence_or_with_an_unknown_call_is_an_error():

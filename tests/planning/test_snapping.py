@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from unilavira_drake.messages import OccupancyMap
 from unilavira_drake.planning.navigation_grid import make_navigation_grid
-from unilavira_drake.planning.snapping import BESIDE, UNREACHABLE, snap
+from unilavira_drake.planning.snapping import BESIDE, TIGHT, UNREACHABLE, snap
 
 RADIUS, TURNING = 0.3, 0.4
 
@@ -68,15 +68,19 @@ def test_the_seen_side_is_kept_when_the_other_side_is_nearer():
     assert math.dist(center, (2.9, 1.0)) > 0.7  # across the wall it would be 0.5 m
 
 
-def test_room_to_turn_is_preferred_and_a_narrow_place_is_taken():
+def test_room_to_turn_is_preferred_and_a_place_to_get_stuck_refused():
     # A passage 0.7 m wide holds the robot but does not let it turn.
     passage = ((2.5, 0.0, 3.5, 1.65), (2.5, 2.35, 3.5, 4.0))
     found, grid, center = snapped(room(passage), (3.0, 2.0), (1.0, 2.0))
     assert grid.clearance[found.cell] >= TURNING
     assert center[0] < 2.5
+    found, _, _ = snapped(room(passage), (3.0, 2.0), (1.0, 2.0), max_distance=0.4)
+    assert found.cell is None
+    # One of 0.8 m just does.
+    passage = ((2.5, 0.0, 3.5, 1.6), (2.5, 2.4, 3.5, 4.0))
     found, grid, center = snapped(room(passage), (3.0, 2.0), (1.0, 2.0), max_distance=0.4)
-    assert RADIUS <= grid.clearance[found.cell] < TURNING
-    assert math.dist(center, (3.0, 2.0)) < 0.04
+    assert TIGHT * TURNING <= grid.clearance[found.cell] < TURNING
+    assert math.dist(center, (3.0, 2.0)) < 0.06
 
 
 def test_a_closed_place_is_unreachable():

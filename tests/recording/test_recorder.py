@@ -95,9 +95,9 @@ def test_what_makes_a_message_new() -> None:
         NavigationStatus(n=1, state="arrived"),
         EpisodeMetrics(),
         EpisodeMetrics(path_length=0.05),
-        EpisodeMetrics(path_length=0.11),
-        EpisodeMetrics(path_length=0.11, collisions=1),
-        EpisodeMetrics(path_length=0.11, collisions=1, cause="stopped"),
+        EpisodeMetrics(path_length=0.26),
+        EpisodeMetrics(path_length=0.26, collisions=1),
+        EpisodeMetrics(path_length=0.26, collisions=1, cause="stopped"),
     ):
         log(0.0, "a", type(message).__name__, message)
     assert [(kind, getattr(message, "n", None)) for _, _, kind, message in seen] == [
