@@ -65,7 +65,14 @@ def make_navigation_diagram(
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))
     wiring.add("station", lambda: make_navigation_station(scenario, world=world, start=start))
-    wiring.add("observer", lambda: Observer(intrinsics=intrinsics, period=scenario.tick))
+    wiring.add(
+        "observer",
+        lambda: Observer(
+            intrinsics=intrinsics,
+            period=scenario.tick,
+            sweep_direction=scenario.robot.sweep_direction,
+        ),
+    )
     wiring.add(
         "agent",
         lambda: make_agent(

@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import cv2
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, Diagram, System
 
@@ -113,11 +114,12 @@ class _Run:
         """Advances until the monitor ends the episode, or a person does."""
         wall, cpu = time.perf_counter(), time.process_time()
         ended = SimulatorStatus.ReturnReason.kReachedTerminationCondition
-        try:
-            while self._simulator.AdvanceTo(self._time() + ADVANCE).reason() != ended:
-                pass
-        except KeyboardInterrupt:
-            self._interrupted = True
+        with _one_opencv_thread():
+            try:
+                while self._simulator.AdvanceTo(self._time() + ADVANCE).reason() != ended:
+                    pass
+            except KeyboardInterrupt:
+                self._interrupted = True
         self.timings["episode_wall_s"] = round(time.perf_counter() - wall, 3)
         self.timings["episode_cpu_s"] = round(time.process_time() - cpu, 3)
 
@@ -137,3 +139,14 @@ class _Run:
 
     def _context(self) -> Context:
         return self._simulator.get_context()
+
+
+@contextlib.contextmanager
+def _one_opencv_thread() -> Iterator[None]:
+    """Images of this size cost more to share among OpenCV's threads than the threads save."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(threads)

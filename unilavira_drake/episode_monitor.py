@@ -83,7 +83,8 @@ class EpisodeMonitor(Level):
         budgets: Budgets,
         goal_distance: Callable[[float, float], float] | None = None,
     ) -> None:
-        super().__init__(MonitorState(), period=period)
+        # It writes whenever the robot moved, so it belongs to the plant's moments: see OFFSET.
+        super().__init__(MonitorState(), period=period, offset=0.0)
         # Plain numbers: a caller's later change of the scenario must not reach a built System.
         self._budgets = dataclasses.replace(budgets)
         self._goal_distance = goal_distance

@@ -139,16 +139,32 @@ def vector_input(system: LeafSystem, name: str, size: int) -> VectorReader:
     return VectorReader(system, name, size)
 
 
+OFFSET = 0.125
+"""Share of its period after which a level is first polled.
+
+Drake applies the updates of one moment together: a level that is polled when the plant steps has
+its state copied and its outputs computed anew, though it had nothing to do.  An eighth of a tick
+of 0.1 s is no multiple of any usual plant step (5, 10 or 25 ms).
+"""
+
+
 class Level(LeafSystem):
     """A System with one frozen abstract state, polled at a fixed period.
 
     A subclass declares its inputs, publishes views of its state with :meth:`declare_output`, and
     overrides :meth:`step`.  Polling stands in for events at exact times, which Drake's Python
-    bindings cannot schedule; an idle poll returns ``DidNothing`` and copies nothing twice.
+    bindings cannot schedule; an idle poll returns ``DidNothing`` and copies nothing.
+
+    Args:
+        initial_state: frozen.
+        period: of the polls, seconds.
+        offset: time of the first poll, seconds; by default an eighth of the period.
     """
 
-    def __init__(self, initial_state: Any, *, period: float, offset: float = 0.0) -> None:
+    def __init__(self, initial_state: Any, *, period: float, offset: float | None = None) -> None:
         super().__init__()
+        if offset is None:
+            offset = OFFSET * period
         self._state_index = self.DeclareAbstractState(AbstractValue.Make(initial_state))
         self._state_tickets = {self.abstract_state_ticket(self._state_index)}
         self._mirror: tuple[int, Callable[[Any], NDArray[np.float64]]] | None = None

@@ -12,6 +12,7 @@ from pydrake.multibody.plant import AddMultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from unilavira_drake.errors import ScenarioError, TaskError, unknown_name
+from unilavira_drake.messages import SWEEP_ORDERS
 from unilavira_drake.mllm.backends import make_backend
 from unilavira_drake.scenario import ABLATIONS, RENDERERS, Scenario
 from unilavira_drake.task_choice import choose_task
@@ -69,6 +70,9 @@ def validate(scenario: Scenario) -> None:
     _check_name("ablation", "ablation", scenario.ablation, ABLATIONS)
     _check_name("renderer", "renderer", scenario.renderer, RENDERERS)
     _check_name("robot", "robot.name", scenario.robot.name, robot_names())
+    _check_name(
+        "direction", "robot.sweep_direction", scenario.robot.sweep_direction, sorted(SWEEP_ORDERS)
+    )
     for role in ("language_model", "vision_model"):
         make_backend(getattr(scenario, role), place=role)
     _check_order(scenario)

@@ -5,7 +5,7 @@ import math
 import numba
 import numpy as np
 
-from unilavira_drake.messages import SWEEP_ORDER, VIEW_YAW, Frame, Panorama
+from unilavira_drake.messages import DIRECTIONS, VIEW_YAW, Frame, Panorama
 from unilavira_drake.sensors.rig import pinhole
 from unilavira_drake.worlds.palette import PALETTE
 
@@ -51,7 +51,7 @@ class Caster:
         )
 
     def panorama(self, n, x, y, yaw, outcome):
-        frames = tuple(self.frame(view, x, y, yaw + VIEW_YAW[view]) for view in SWEEP_ORDER)
+        frames = tuple(self.frame(view, x, y, yaw + VIEW_YAW[view]) for view in DIRECTIONS)
         c, s = math.cos(yaw), math.sin(yaw)
         X_WB = np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1.0]])
         return Panorama(n=n, first=n, X_WB=X_WB, frames=frames, outcome=outcome)

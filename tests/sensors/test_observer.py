@@ -21,8 +21,8 @@ INTRINSICS = Intrinsics(4, 3, 2.0, 2.0, 1.5, 1.0)
 class Bench:
     """An observer whose inputs are set by hand."""
 
-    def __init__(self) -> None:
-        self.observer = Observer(intrinsics=INTRINSICS, period=0.1)
+    def __init__(self, **options: Any) -> None:
+        self.observer = Observer(intrinsics=INTRINSICS, period=0.1, **options)
         self.simulator = Simulator(self.observer)
         self.context = self.simulator.get_mutable_context()
         for name, image in (
@@ -83,6 +83,15 @@ def test_sweep_captures_four_views_in_order_from_the_arrival_heading() -> None:
     assert axis == pytest.approx([math.cos(0.3 + math.pi / 2), math.sin(0.3 + math.pi / 2), 0])
     assert panorama.frame("left").jpeg.startswith(b"\xff\xd8")
     assert not bench.output("sweep").active
+
+
+def test_the_sweep_may_go_to_the_other_side() -> None:
+    bench = Bench(sweep_direction="right")
+    bench.sweep(0.0, 0.0)
+    panorama = bench.output("panorama")
+    assert [f.view for f in panorama.frames] == ["front", "right", "back", "left"]
+    axis = panorama.frame("left").X_WC[:3, 2]
+    assert axis == pytest.approx([math.cos(0.3 + math.pi / 2), math.sin(0.3 + math.pi / 2), 0])
 
 
 def test_no_capture_while_turning() -> None:

@@ -8,6 +8,7 @@ cell is missed or visited twice, however near or far it is.
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -166,13 +167,15 @@ def apply(
             log_odds[corner[0] + i, corner[1] + j] = new if new != 0 else -1
 
 
+@functools.lru_cache(16)
 def symmetric_columns(width: int, stride: int) -> NDArray[np.int32]:
-    """Returns every ``stride``-th column, counted from both edges towards the middle.
+    """Returns every ``stride``-th column, counted from both edges towards the middle; read-only.
 
     So a mirrored image is read at the mirrored pixels.
     """
     left = np.arange(0, (width + 1) // 2, stride)
-    return np.unique(np.concatenate((left, width - 1 - left))).astype(np.int32)
+    columns = np.unique(np.concatenate((left, width - 1 - left))).astype(np.int32)
+    return frozen_view(columns, np.int32)
 
 
 def warm_up() -> None:
@@ -180,5 +183,5 @@ def warm_up() -> None:
     camera, grid, band = np.zeros(7), np.ones(5), np.ones(4)
     hits, bearings = np.zeros((1, 1), np.uint16), np.zeros((3, 1))
     depth = frozen_view(np.zeros((1, 1)), np.float32)
-    scan(depth, np.zeros(1, np.int32), 1, camera, np.eye(3), band, grid, hits, bearings)
+    scan(depth, symmetric_columns(1, 1), 1, camera, np.eye(3), band, grid, hits, bearings)
     apply(np.zeros((1, 1), np.int8), np.zeros(2, np.int64), 1, camera, 1.0, grid, hits, bearings)

@@ -105,28 +105,25 @@ def _grown(
     mirrored grid.
     """
     block = BLOCK * parameters.resolution
-    bounds = np.empty((2, 2), np.int64)
-    for axis in (0, 1):
-        values = [spot[axis] for spot in spots]
-        # Axis 0 of a spot is x: columns.
-        bounds[1 - axis, 0] = math.floor((min(values) - parameters.max_range) / block) * BLOCK
-        bounds[1 - axis, 1] = math.ceil((max(values) + parameters.max_range) / block) * BLOCK
-    if occupancy.version > 0:
-        old = np.array(
-            [round(occupancy.origin[1] / occupancy.resolution),
-             round(occupancy.origin[0] / occupancy.resolution)]
-        )  # fmt: skip
-        shape = np.array(occupancy.shape)
-        if np.all(bounds[:, 0] >= old) and np.all(bounds[:, 1] <= old + shape):
-            return occupancy.log_odds.copy(), (int(old[0]), int(old[1]))
-        bounds[:, 0] = np.minimum(bounds[:, 0], old)
-        bounds[:, 1] = np.maximum(bounds[:, 1], old + shape)
-    rows, columns = bounds[:, 1] - bounds[:, 0]
-    log_odds = np.zeros((int(rows), int(columns)), np.int8)
-    if occupancy.version > 0:
-        i, j = old - bounds[:, 0]
-        log_odds[i : i + shape[0], j : j + shape[1]] = occupancy.log_odds
-    return log_odds, (int(bounds[0, 0]), int(bounds[1, 0]))
+    reach = parameters.max_range
+    low: list[int] = []
+    high: list[int] = []
+    # Rows run along y, the second number of a spot.
+    for values in ([spot[1] for spot in spots], [spot[0] for spot in spots]):
+        low.append(math.floor((min(values) - reach) / block) * BLOCK)
+        high.append(math.ceil((max(values) + reach) / block) * BLOCK)
+    if occupancy.version == 0:
+        return np.zeros((high[0] - low[0], high[1] - low[1]), np.int8), (low[0], low[1])
+    row = round(occupancy.origin[1] / occupancy.resolution)
+    column = round(occupancy.origin[0] / occupancy.resolution)
+    rows, columns = occupancy.shape
+    i0, i1 = min(low[0], row), max(high[0], row + rows)
+    j0, j1 = min(low[1], column), max(high[1], column + columns)
+    if (i1 - i0, j1 - j0) == (rows, columns):
+        return occupancy.log_odds.copy(), (row, column)
+    log_odds = np.zeros((i1 - i0, j1 - j0), np.int8)
+    log_odds[row - i0 : row - i0 + rows, column - j0 : column - j0 + columns] = occupancy.log_odds
+    return log_odds, (i0, j0)
 
 
 def _mark_footprint(
@@ -139,6 +136,8 @@ def _mark_footprint(
     rows = _cells(position[1], radius, resolution, first[0], log_odds.shape[0])
     columns = _cells(position[0], radius, resolution, first[1], log_odds.shape[1])
     window = log_odds[rows, columns]
+    if window.all():
+        return
     y = (np.arange(rows.start, rows.stop) + first[0] + 0.5) * resolution - position[1]
     x = (np.arange(columns.start, columns.stop) + first[1] + 0.5) * resolution - position[0]
     inside = (x[None, :] ** 2 + y[:, None] ** 2) <= radius**2

@@ -121,7 +121,7 @@ class OccupancyMapper(Level):
         return self._integrated(context, state, X_WB, views, state.occupancy.n, floor_height)
 
     def _due(self, time: float, state: MapperState, X_WB: RigidTransform) -> bool:
-        if time - state.time >= self._rest_period:
+        if time - state.time >= self._rest_period - 1e-9:
             return True
         x, y, _ = X_WB.translation()
         if math.hypot(x - state.position[0], y - state.position[1]) >= self._travel:

@@ -19,7 +19,7 @@ from unilavira_drake.messages.memory import (
 )
 from unilavira_drake.messages.observation import (
     DIRECTIONS,
-    SWEEP_ORDER,
+    SWEEP_ORDERS,
     VIEW_YAW,
     Frame,
     Intrinsics,
@@ -39,7 +39,7 @@ from unilavira_drake.messages.plans import (
 __all__ = [
     "CALLS",
     "DIRECTIONS",
-    "SWEEP_ORDER",
+    "SWEEP_ORDERS",
     "TERMINAL_STATES",
     "TOOLS",
     "VIEW_YAW",

@@ -16,8 +16,11 @@ DIRECTIONS = ("front", "left", "right", "back")
 VIEW_YAW = {"front": 0.0, "left": math.pi / 2, "back": math.pi, "right": -math.pi / 2}
 """Yaw of each view relative to ``front``, radians, counter-clockwise positive."""
 
-SWEEP_ORDER = ("front", "left", "back", "right")
-"""The order in which a robot with one camera captures the views, turning to its left."""
+SWEEP_ORDERS = {
+    "left": ("front", "left", "back", "right"),
+    "right": ("front", "right", "back", "left"),
+}
+"""The order in which a robot with one camera captures the views, by the side it turns to."""
 
 
 def direction_of(bearing: float) -> str:

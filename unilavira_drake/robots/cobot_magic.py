@@ -30,6 +30,8 @@ class CobotMagic:
     # Depth range of the camera.
     min_depth: float = 0.1
     max_depth: float = 10.0
+    # The side to which the robot turns to look around: left or right.
+    sweep_direction: str = "left"
     # Period of controller and governor, seconds; a multiple of the plant's time step.
     control_period: float = 0.05
     can_climb: bool = False

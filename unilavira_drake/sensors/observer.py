@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I, ImageRgba8U
 
 from unilavira_drake.messages import (
-    SWEEP_ORDER,
+    SWEEP_ORDERS,
     VIEW_YAW,
     Frame,
     Intrinsics,
@@ -76,6 +76,7 @@ class Observer(Level):
     Args:
         intrinsics: of the front camera.
         period: polling period, seconds.
+        sweep_direction: ``left`` or ``right``, the side to which the robot turns to look around.
         heading_tolerance: a view is captured within this error of its heading, radians ...
         rest_rate: ... and below this yaw rate (rad/s) and speed (m/s) ...
         view_deadline: ... or after this many seconds, at whatever heading was reached; the
@@ -87,12 +88,14 @@ class Observer(Level):
         *,
         intrinsics: Intrinsics,
         period: float,
+        sweep_direction: str = "left",
         heading_tolerance: float = 0.02,
         rest_rate: float = 0.03,
         view_deadline: float = 8.0,
     ) -> None:
         super().__init__(ObserverState(), period=period)
         self._intrinsics = intrinsics
+        self._order = SWEEP_ORDERS[sweep_direction]
         self._heading_tolerance = heading_tolerance
         self._rest_rate = rest_rate
         self._view_deadline = view_deadline
@@ -146,10 +149,10 @@ class Observer(Level):
         )
         if not (at_rest and on_heading) and time - state.since < self._view_deadline:
             return state
-        view = SWEEP_ORDER[len(state.frames)]
+        view = self._order[len(state.frames)]
         frames = (*state.frames, self._frame(context, view, X_WB, time))
-        if len(frames) < len(SWEEP_ORDER):
-            heading = state.heading + VIEW_YAW[SWEEP_ORDER[len(frames)]]
+        if len(frames) < len(self._order):
+            heading = state.heading + VIEW_YAW[self._order[len(frames)]]
             sweep = dataclasses.replace(state.sweep, heading=heading)
             return dataclasses.replace(state, frames=frames, sweep=sweep, since=time)
         front = _at_yaw(X_WB, state.heading)
