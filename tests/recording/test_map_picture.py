@@ -60,6 +60,15 @@ def test_the_trace_keeps_way_waypoints_backtracks_and_aims() -> None:
     assert trace.waypoints == {1: (1.0, 1.0), 2: (4.0, 1.0)}
     assert trace.backtracks == ((30.0, 45.0),)
     assert trace.goals == [(4.2, 1.1)]
+    assert trace.ends == ((1.0, 1.0, 0.0), (*trace.points[-1, 1:], 0.0))
+    assert EpisodeTrace().ends == (None, None)
+    assert trace.legs == {3: (30.0, 45.0)}
+    assert trace.poses == {
+        1: (1.0, 1.0, 0.0),
+        2: (4.0, 1.0, 0.0),
+        3: (4.0, 1.0, 0.0),
+        4: (1.0, 1.0, 0.0),
+    }
 
 
 def test_the_picture_is_a_png_of_the_same_bytes_each_time() -> None:
@@ -71,8 +80,29 @@ def test_the_picture_is_a_png_of_the_same_bytes_each_time() -> None:
     assert pictures[0] == pictures[1]
     image = cv2.imdecode(np.frombuffer(pictures[0], np.uint8), cv2.IMREAD_COLOR)
     assert image is not None
-    assert min(image.shape[:2]) > 500
+    assert image.shape[1] == 1440
+    assert image.shape[0] > 700
     assert len(np.unique(image.reshape(-1, 3), axis=0)) > 50
+
+
+def test_the_goal_and_its_area_are_drawn_and_a_long_title_is_wrapped() -> None:
+    area = (np.array([[4.0, 2.0], [5.8, 2.0], [5.8, 3.9], [4.0, 3.9]]),)
+    plain = map_picture(WORLD, episode())
+    marked = map_picture(WORLD, episode(), goals=((5.0, 3.0),), goal_area=area)
+    titled = map_picture(WORLD, episode(), title="Go to the $sofa$. " * 60)
+    images = [
+        cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+        for png in (plain, marked, titled)
+    ]
+    assert images[0].shape == images[1].shape
+    assert images[2].shape[1] == images[0].shape[1]
+    assert 0 < images[2].shape[0] - images[0].shape[0] < 200
+    # The goal's colour (BGR) is in the marked picture alone.
+    counts = [
+        int((np.abs(image.astype(int) - (108, 32, 176)).max(2) < 8).sum()) for image in images
+    ]
+    assert counts[1] > 300
+    assert counts[0] == counts[2] == 0
 
 
 def test_an_episode_that_never_moved_has_a_picture_too() -> None:

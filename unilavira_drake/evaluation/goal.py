@@ -137,4 +137,5 @@ def _gaps(target: GoalTarget, world: World, points: NDArray[np.float64]) -> NDAr
         dataclasses.replace(box, center=(*box.center[:2], 0.5), size=(*box.size[:2], 1.0))
         for box in thing.boxes
     )
-    return clearance(World(objects=(dataclasses.replace(thing, boxes=grounded),)), points)
+    solid = dataclasses.replace(thing, boxes=grounded, solid=True)
+    return clearance(World(objects=(solid,)), points)

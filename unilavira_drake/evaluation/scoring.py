@@ -66,6 +66,7 @@ class Score(Message):
     """Whether the robot ever was within the success distance."""
     same_room: bool | None = None
     goal_seen: bool | None = None
+    answer_correct: bool | None = None
     notes: tuple[str, ...] = ()
     """Why a figure is not defined."""
 

@@ -6,24 +6,36 @@ import io
 import textwrap
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.messages import OccupancyMap
+from unilavira_drake.recording import map_layers
+from unilavira_drake.recording.floor_plan import FloorPlan, floor_plan
+from unilavira_drake.recording.plan_labels import Lettering, room_labels, thing_labels
 from unilavira_drake.recording.trace import EpisodeTrace
-from unilavira_drake.worlds.world import World, WorldObject
+from unilavira_drake.worlds.world import World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
 
-_WIDTH = 10.0
-"""Inches, at ``_DPI``."""
-_DPI = 120
-_MARGIN = 0.3
-"""Metres around the rooms."""
-_UNKNOWN, _FREE, _OCCUPIED = 0.92, 1.0, 0.68
-"""Grey of the mapped cells."""
+_DPI = 200
+_WIDTH = 7.2
+"""Inches: two columns of a paper."""
+_TALLEST = 8.0
+"""Inches of plan; a world that is higher than wide gets a narrower one."""
+_BAR = 0.75
+"""Inches to the right of the plan, for the colour bar."""
+_LEGEND = 0.5
+"""Inches below the plan, for scale bar and legend."""
+_EDGE = 0.1
+"""Inches around everything."""
+_TITLE_LINE = 0.17
+"""Inches."""
+_LETTER, _BOLD_LETTER = 0.58, 0.70
+"""Mean width of a letter of the font, in letter heights."""
 
 
 def map_picture(
@@ -32,162 +44,123 @@ def map_picture(
     occupancy: OccupancyMap | None = None,
     *,
     goals: tuple[tuple[float, float], ...] = (),
+    goal_area: tuple[NDArray[np.float64], ...] = (),
     title: str = "",
 ) -> bytes:
-    """Returns the picture of an episode as PNG.
+    """Returns the picture of an episode as PNG, 1440 pixels wide, for a page or a paper.
 
-    Thin lines are the true rooms and furniture, the grey under them is what the robot mapped.
-    The way is coloured by simulated time, dashed where the robot drove back to a waypoint.
+    Lines are the true rooms and furniture, the grey under them is what the robot mapped.  The
+    way is coloured by simulated time, dashed and a little to its left where the robot drove back
+    to a waypoint; start and end have an arrow along the front of the first and last panorama.
 
     Args:
+        world: the true world.
+        trace: the way.
+        occupancy: what was mapped.
         goals: where the task's goal lies, metres in the world; none when it is not scored.
-        title: one line above the picture.
+        goal_area: outlines, (k, 2) metres in the world, of the floor on which a stop succeeds.
+        title: above the picture, wrapped.
     """
+    plan = floor_plan(world)
+    lines = textwrap.wrap(" ".join(title.split()), 100, max_lines=4, placeholder=" …")
+    figure, axes, scale = _canvas(plan, len(lines))
+    point = 1.0 / 72.0 / scale
+    _write_title(figure, lines)
+    map_layers.draw_rooms(axes, plan)
+    if occupancy is not None:
+        map_layers.draw_occupancy(axes, occupancy)
+    map_layers.draw_plan(axes, plan)
+    _write_names(axes, plan, scale, trace, goals)
+    map_layers.draw_goal(axes, goals, goal_area, point)
+    colors = map_layers.draw_way(axes, trace, point)
+    map_layers.draw_places(axes, trace, point)
+    map_layers.draw_scale(axes, plan, scale)
+    if colors is not None:
+        _color_bar(figure, axes, colors)
+    _legend(figure, axes)
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return stream.getvalue()
+
+
+def _canvas(plan: FloorPlan, title_lines: int) -> tuple[Figure, Axes, float]:
+    """Returns a figure around a plan at one scale (inches per metre), without ticks."""
     # Half a second to import, and only this picture needs it.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    x_min, y_min, x_max, y_max = _bounds(world)
-    figure = Figure(figsize=(_WIDTH, _WIDTH * (y_max - y_min) / (x_max - x_min) + 1.2), dpi=_DPI)
-    figure.set_layout_engine("constrained")
+    x_min, y_min, x_max, y_max = plan.bounds
+    scale = min((_WIDTH - _BAR - 2 * _EDGE) / (x_max - x_min), _TALLEST / (y_max - y_min))
+    wide, tall = scale * (x_max - x_min), scale * (y_max - y_min)
+    above = _EDGE + (_TITLE_LINE * title_lines + 0.06 if title_lines else 0.0)
+    width, height = _WIDTH, tall + above + _LEGEND
+    figure = Figure(figsize=(width, height), dpi=_DPI, facecolor="white")
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal")
-    axes.set_title(textwrap.fill(title, 110, max_lines=4, placeholder=" …"), fontsize=10)
-    axes.set(xlabel="x [m]", ylabel="y [m]", facecolor=str(_UNKNOWN))
-    if occupancy is not None:
-        _draw_occupancy(axes, occupancy)
-    _draw_world(axes, world)
-    _draw_way(axes, trace)
-    _draw_places(axes, trace, goals)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=7, frameon=False)
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", bbox_inches="tight", metadata={"Software": None})
-    return stream.getvalue()
+    left = (width - _BAR - wide) / 2
+    axes = figure.add_axes((left / width, _LEGEND / height, wide / width, tall / height))
+    axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max))
+    axes.set_axis_off()
+    return figure, axes, scale
 
 
-def _bounds(world: World) -> tuple[float, float, float, float]:
-    rectangles = np.array([room.rectangle for room in world.rooms])
-    x_min, y_min = rectangles[:, :2].min(axis=0) - _MARGIN
-    x_max, y_max = rectangles[:, 2:].max(axis=0) + _MARGIN
-    return float(x_min), float(y_min), float(x_max), float(y_max)
-
-
-def _draw_occupancy(axes: Axes, occupancy: OccupancyMap) -> None:
-    grey = np.full(occupancy.shape, _UNKNOWN)
-    grey[occupancy.log_odds < 0] = _FREE
-    grey[occupancy.log_odds > 0] = _OCCUPIED
-    (x, y), (rows, columns), side = occupancy.origin, occupancy.shape, occupancy.resolution
-    axes.imshow(
-        grey,
-        cmap="gray",
-        vmin=0.0,
-        vmax=1.0,
-        origin="lower",
-        extent=(x, x + columns * side, y, y + rows * side),
-        interpolation="nearest",
-        zorder=0,
+def _write_title(figure: Figure, lines: list[str]) -> None:
+    figure.text(
+        _EDGE / figure.get_figwidth(),
+        1.0 - _EDGE / figure.get_figheight(),
+        "\n".join(lines),
+        ha="left",
+        va="top",
+        fontsize=8.5,
+        parse_math=False,
     )
 
 
-def _draw_world(axes: Axes, world: World) -> None:
-    from matplotlib.patches import Polygon
-
-    for room in world.rooms:
-        x_min, _, x_max, y_max = room.rectangle
-        axes.text(
-            (x_min + x_max) / 2,
-            y_max - 0.2,
-            room.kind,
-            ha="center",
-            va="top",
-            fontsize=9,
-            color="0.45",
-            zorder=2,
-        )
-    outlines = [(np.array(wall.corners()), "0.25") for wall in world.walls]
-    labels: list[NDArray[np.float64]] = []
-    for thing in world.objects:
-        outline = _footprint(thing)
-        is_door = thing.category == "door"
-        outlines.append((outline, "tab:cyan" if is_door else "tab:brown"))
-        if not is_door:
-            place = (outline.min(axis=0) + outline.max(axis=0)) / 2
-            # What stands on something else is written below it.
-            while any(np.all(np.abs(place - other) < (0.6, 0.2)) for other in labels):
-                place = place - (0.0, 0.2)
-            labels.append(place)
-            axes.text(
-                place[0],
-                place[1],
-                thing.name,
-                ha="center",
-                va="center",
-                fontsize=6,
-                color="tab:brown",
-                zorder=2,
-            )
-    for corners, color in outlines:
-        axes.add_patch(Polygon(corners, fill=False, linewidth=0.6, edgecolor=color, zorder=1))
+def _write_names(
+    axes: Axes,
+    plan: FloorPlan,
+    scale: float,
+    trace: EpisodeTrace,
+    goals: tuple[tuple[float, float], ...],
+) -> None:
+    """Writes names of rooms, then those of things that hide neither these nor waypoints."""
+    rooms = room_labels(
+        plan, _lettering(map_layers.ROOM_FONT, scale, _BOLD_LETTER), trace.points[:, 1:]
+    )
+    taken = [rectangle for _, rectangle in rooms]
+    reach = 9.0 / 72.0 / scale
+    for places in (trace.waypoints.values(), goals):
+        taken += [(x - reach, y - reach, x + reach, y + reach) for x, y in places]
+    map_layers.draw_words(axes, [label for label, _ in rooms], map_layers.ROOM_FONT, bold=True)
+    words = thing_labels(plan, _lettering(map_layers.THING_FONT, scale), taken)
+    map_layers.draw_words(axes, words, map_layers.THING_FONT)
 
 
-def _footprint(thing: WorldObject) -> NDArray[np.float64]:
-    """The convex outline of a thing on the floor, (k, 2) metres."""
-    corners = np.array([corner for box in thing.boxes for corner in box.corners()], np.float32)
-    return np.asarray(cv2.convexHull(corners)[:, 0, :], np.float64)
+def _color_bar(figure: Figure, axes: Axes, colors: LineCollection) -> None:
+    plan, width = axes.get_position(), figure.get_figwidth()
+    left = 1.0 - (_BAR - 0.12) / width
+    bar = figure.add_axes((left, plan.y0 + 0.1 * plan.height, 0.11 / width, 0.8 * plan.height))
+    figure.colorbar(colors, cax=bar)
+    bar.tick_params(labelsize=6.5, length=2)
+    bar.set_ylabel("simulated time [s]", fontsize=7)
 
 
-def _draw_way(axes: Axes, trace: EpisodeTrace) -> None:
-    from matplotlib.collections import LineCollection
-
-    points = trace.points
-    if len(points) < 2:
-        return
-    segments = np.stack([points[:-1, 1:], points[1:, 1:]], axis=1)
-    times = points[1:, 0]
-    way = LineCollection(list(segments), cmap="viridis", linewidth=3.5, zorder=4)
-    way.set_array(times)
-    axes.add_collection(way)
-    axes.figure.colorbar(way, ax=axes, label="simulated time [s]", shrink=0.7, pad=0.01)
-    axes.plot([], [], linewidth=3.5, color=way.cmap(0.5), label="way")
-    # On top of the way there, which it often retraces.
-    label = "drove back to a waypoint"
-    for begin, end in trace.backtracks:
-        back = points[(points[:, 0] >= begin) & (points[:, 0] <= end), 1:]
-        axes.plot(*back.T, "--", color="tab:red", linewidth=1.6, zorder=5, label=label)
-        label = "_"  # one entry in the legend
+def _lettering(points: float, scale: float, letter: float = _LETTER) -> Lettering:
+    height = points / 72.0 / scale
+    return Lettering(height=height, letter_width=letter * height)
 
 
-def _draw_places(axes: Axes, trace: EpisodeTrace, goals: tuple[tuple[float, float], ...]) -> None:
-    points = trace.points
-    if trace.goals:
-        axes.plot(
-            *np.array(trace.goals).T, "+", color="tab:blue", markersize=7, zorder=5, label="aim"
-        )
-    for index, (waypoint, (x, y)) in enumerate(sorted(trace.waypoints.items())):
-        axes.plot(
-            x,
-            y,
-            "o",
-            color="white",
-            markeredgecolor="black",
-            markersize=10,
-            zorder=7,
-            label="waypoint" if index == 0 else "_",
-        )
-        axes.text(x, y, str(waypoint), ha="center", va="center", fontsize=7, zorder=8)
-    if len(points):
-        axes.plot(*points[0, 1:], "s", color="tab:green", markersize=14, zorder=6, label="start")
-        axes.plot(*points[-1, 1:], "D", color="tab:red", markersize=12, zorder=6, label="end")
-    if goals:
-        axes.plot(
-            *np.array(goals).T,
-            "*",
-            color="gold",
-            markeredgecolor="black",
-            markersize=16,
-            linestyle="none",
-            zorder=9,
-            label="goal",
+def _legend(figure: Figure, axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        figure.legend(
+            handles,
+            labels,
+            loc="lower right",
+            bbox_to_anchor=(1.0 - _EDGE / _WIDTH, 0.02),
+            ncols=len(handles),
+            fontsize=6.5,
+            frameon=False,
+            handlelength=1.6,
+            handletextpad=0.5,
+            columnspacing=1.1,
         )

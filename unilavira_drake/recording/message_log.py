@@ -18,8 +18,9 @@ class MessageLog:
     """Passes new messages to its listeners, in their order.
 
     A message is new when its (system, event, number, attempt, state) is; number 0 is a port's
-    initial value.  Metrics are new after some travel, at a collision and at the end.  So polling
-    again changes nothing, nor does a cloned Context that replays what was already seen.
+    initial value.  So a map is new with each panorama in it.  Metrics are new after some travel,
+    at a collision and at the end.  So polling again changes nothing, nor does a cloned Context
+    that replays what was already seen.
     """
 
     def __init__(self, listeners: Sequence[Listener]) -> None:

@@ -8,6 +8,7 @@ from unilavira_drake.messages import (
     Goal,
     LanguageAction,
     NavigationStatus,
+    OccupancyMap,
     Panorama,
     TodoList,
     VisionAction,
@@ -26,6 +27,7 @@ PORTS = {
     "vision_request": ("vision", "model_request", MllmRequest()),
     "vision_reply": ("vision_link", "model_reply", MllmReply()),
     "vision_action": ("vision", "vision_action", VisionAction()),
+    "map": ("mapper", "map", OccupancyMap()),
     "goal": ("goal_selector", "goal", Goal()),
     "navigation_status": ("planner", "navigation_status", NavigationStatus()),
     "metrics": ("episode_monitor", "metrics", EpisodeMetrics()),
@@ -50,6 +52,7 @@ class Recorder(LeafSystem):
         - vision_request
         - vision_reply
         - vision_action
+        - map
         - goal
         - navigation_status
         - metrics

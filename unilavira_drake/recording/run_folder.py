@@ -8,10 +8,12 @@ from types import TracebackType
 from typing import Any
 
 from unilavira_drake.errors import InputError
+from unilavira_drake.recording.occupancy_picture import PNG_MAGIC
 from unilavira_drake.recording.transcript import transcript_line
 
 TRANSCRIPT = "transcript.jsonl"
 FRAMES = "frames"
+MAPS = "maps"
 
 
 class RunFolder:
@@ -54,9 +56,11 @@ class RunFolder:
         pictures: dict[str, bytes] = {}
         self._decision = getattr(message, "n", self._decision)
         line = transcript_line(t, self._decision, system, event, message, pictures)
-        for digest, jpeg in pictures.items():
+        for digest, picture in pictures.items():
             if digest not in self._pictures:
-                self.write(f"{FRAMES}/{digest}.jpg", jpeg)
+                is_map = picture.startswith(PNG_MAGIC)
+                name = f"{MAPS}/{digest}.png" if is_map else f"{FRAMES}/{digest}.jpg"
+                self.write(name, picture)
                 self._pictures.add(digest)
         self._stream.write(line + "\n")
         self._stream.flush()

@@ -11,15 +11,21 @@ from unilavira_drake.messages import Goal, LanguageAction, NavigationStatus, Pan
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 
+Pose = tuple[float, float, float]
+"""x and y in metres in the world, yaw in radians."""
+
 
 class EpisodeTrace:
     """A listener that keeps the way of the robot, for the picture of the map."""
 
     def __init__(self) -> None:
         self._points: list[tuple[float, float, float]] = []
-        self._panoramas: dict[int, tuple[float, float]] = {}
-        self._backtracks: dict[int, tuple[float, float]] = {}
+        self._backtracks: list[int] = []
         self._departures: dict[int, float] = {}
+        self.poses: dict[int, Pose] = {}
+        """Panorama -> where it was taken, along its front."""
+        self.legs: dict[int, tuple[float, float]] = {}
+        """Language action -> when it was decided and when its goal was done, simulated seconds."""
         self.waypoints: dict[int, tuple[float, float]] = {}
         """Waypoint -> (x, y), metres in the world."""
         self.goals: list[tuple[float, float]] = []
@@ -33,27 +39,40 @@ class EpisodeTrace:
     @property
     def backtracks(self) -> tuple[tuple[float, float], ...]:
         """Start and end of each backtrack, simulated seconds."""
-        return tuple(self._backtracks[n] for n in sorted(self._backtracks))
+        return tuple(self.legs[n] for n in sorted(self._backtracks) if n in self.legs)
+
+    @property
+    def ends(self) -> tuple[Pose | None, Pose | None]:
+        """Where the way begins and ends, each along the front of the nearest panorama.
+
+        None before the first panorama.
+        """
+        if not self.poses:
+            return None, None
+        first, last = self.poses[min(self.poses)], self.poses[max(self.poses)]
+        x, y = self._points[-1][1:] if self._points else last[:2]
+        return first, (x, y, last[2])
 
     def record(self, t: float, system: str, event: str, message: Any) -> None:
         """Takes a new message at a time, simulated seconds."""
         if isinstance(message, EpisodeMetrics):
             self._points.append((t, message.x, message.y))
         elif isinstance(message, Panorama):
-            self._panoramas[message.n] = message.position[:2]
+            self.poses[message.n] = (*message.position[:2], message.yaw)
         elif isinstance(message, MllmRequest):
             self._place_waypoint(message)
         elif isinstance(message, LanguageAction):
+            self._departures[message.n] = t
             if message.tool == "backtrack":
-                self._departures[message.n] = t
+                self._backtracks.append(message.n)
         elif isinstance(message, Goal):
             if message.kind == "go" and message.p_WG is not None:
                 self.goals.append(message.p_WG[:2])
         elif isinstance(message, NavigationStatus):
             if message.terminal and message.n in self._departures:
-                self._backtracks[message.n] = (self._departures[message.n], t)
+                self.legs[message.n] = (self._departures[message.n], t)
 
     def _place_waypoint(self, request: MllmRequest) -> None:
-        if isinstance(request.variables, LanguageVariables) and request.n in self._panoramas:
+        if isinstance(request.variables, LanguageVariables) and request.n in self.poses:
             waypoint = request.variables.current_waypoint
-            self.waypoints.setdefault(waypoint, self._panoramas[request.n])
+            self.waypoints.setdefault(waypoint, self.poses[request.n][:2])

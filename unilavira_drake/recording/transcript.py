@@ -1,7 +1,8 @@
 """Turns messages into lines of the transcript: the same episode gives the same bytes.
 
 A line is ``{t, decision, system, event, data}`` in simulated time.  Floats are rounded to six
-digits; pictures stand as the SHA-256 of their JPEG; arrays larger than a pose are left out.
+digits; pictures stand as the SHA-256 of their file; arrays larger than a pose are left out.  An
+occupancy map is such a picture too, see ``occupancy_picture``.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from unilavira_drake.messages import Frame
+from unilavira_drake.messages import Frame, OccupancyMap
+from unilavira_drake.recording.occupancy_picture import PNG_MAGIC, occupancy_png
 
 DIGITS = 6
 LARGEST_ARRAY = 16
@@ -29,7 +31,7 @@ def plain(value: Any, pictures: dict[str, bytes]) -> Any:
     """Returns the JSON value of a message or of a part of one; keys are in sorted order.
 
     Args:
-        pictures: gets the JPEG of every picture in the value, by SHA-256.
+        pictures: gets every picture in the value (JPEG; PNG for a map), by SHA-256.
 
     Raises:
         TypeError: for a value that is no message.
@@ -57,7 +59,7 @@ def transcript_line(
     Args:
         t: simulated seconds.
         decision: number of the language call that the message belongs to.
-        pictures: gets the JPEG of every picture in the message, by SHA-256.
+        pictures: gets every picture in the message (JPEG; PNG for a map), by SHA-256.
     """
     line = {
         "t": _rounded(t),
@@ -77,6 +79,10 @@ def _items(value: Any) -> Mapping[str, Any]:
     if isinstance(value, Frame):
         return {name: getattr(value, name) for name in _FRAME_FIELDS}
     items = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    if isinstance(value, OccupancyMap):
+        items |= {"shape": value.shape, "image": occupancy_png(value)}
+        # A one-cell map would else show its cell twice.
+        del items["log_odds"]
     return {name: item for name, item in items.items() if not _is_large(item)}
 
 
@@ -94,6 +100,6 @@ def _digest(value: bytes, pictures: dict[str, bytes]) -> str:
     if not value:
         return ""
     digest = hashlib.sha256(value).hexdigest()
-    if value.startswith(_JPEG_MAGIC):
+    if value.startswith((_JPEG_MAGIC, PNG_MAGIC)):
         pictures[digest] = value
     return digest

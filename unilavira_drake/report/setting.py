@@ -1,0 +1,96 @@
+"""What a report needs beside the transcript: the world, the goal and what the models are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from unilavira_drake.errors import UniLaviraError
+from unilavira_drake.evaluation.goal_area import success_area
+from unilavira_drake.evaluation.scoring import make_goal_field
+from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.recording.floor_plan import FloorPlan, Outline, floor_plan
+from unilavira_drake.recording.result import EpisodeResult
+from unilavira_drake.scenario import Scenario
+from unilavira_drake.scenario_loading import load_scenario
+from unilavira_drake.task_choice import choose_task
+from unilavira_drake.worlds.load import load_world
+from unilavira_drake.worlds.world import World
+
+_REASONING = {
+    "rules": "rules, not a multimodal LLM",
+    "model": "a model",
+    "human": "a person",
+}
+_PERCEPTION = {
+    "ground_truth": "sees what a perfect detector would say, from the simulator's labels",
+    "images": "sees the pictures",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """The scene of a run, as far as it can still be had."""
+
+    plan: FloorPlan | None = None
+    goals: tuple[tuple[float, float], ...] = ()
+    goal_area: tuple[Outline, ...] = ()
+    goal: str = ""
+    """What the episode is scored against; empty when it is not."""
+    task: str = ""
+    models: tuple[str, ...] = ()
+    """One sentence for each model."""
+    problems: tuple[str, ...] = ()
+
+
+def read_setting(folder: Path, result: EpisodeResult | None) -> Setting:
+    """Returns the setting of a run folder; what cannot be read is told in ``problems``."""
+    path = folder / "scenario.yaml"
+    models = _declared(result)
+    if not path.is_file():
+        told = "scenario.yaml is missing: maps are without rooms and furniture."
+        return Setting(models=models, problems=(told,))
+    try:
+        scenario = load_scenario(path)
+        models = _described(scenario)
+        task = choose_task(scenario)
+        world = load_world(scenario.world.name, mirror=scenario.world.mirror)
+    except (UniLaviraError, OSError) as error:
+        told = f"Maps are without rooms and furniture: {error}"
+        return Setting(models=models, problems=(told,))
+    goals, area, problems = _goal(task.goal, world, scenario.robot.radius)
+    return Setting(
+        floor_plan(world), goals, area, task.goal, task.spec.text, models, problems=problems
+    )
+
+
+def _goal(
+    text: str, world: World, radius: float
+) -> tuple[tuple[tuple[float, float], ...], tuple[Outline, ...], tuple[str, ...]]:
+    if not text:
+        return (), (), ()
+    try:
+        goal = make_goal_field(text, world, radius=radius)
+    except UniLaviraError as error:
+        return (), (), (f"The goal is not on the maps: {error}",)
+    return goal.places, success_area(goal), ()
+
+
+def _described(scenario: Scenario) -> tuple[str, ...]:
+    language = make_backend(scenario.language_model, place="language_model").description
+    vision = make_backend(scenario.vision_model, place="vision_model").description
+    if language == vision:
+        return (f"Both models: {language}.",)
+    return (f"Language model: {language}.", f"Vision model: {vision}.")
+
+
+def _declared(result: EpisodeResult | None) -> tuple[str, ...]:
+    """What the result says about the models, when the scenario cannot tell."""
+    if result is None:
+        return ()
+    model = result.model
+    names = dict.fromkeys((model.language, model.vision))
+    return (
+        f"{' and '.join(names)}: {_REASONING.get(model.reasoning, model.reasoning)}; "
+        f"{_PERCEPTION.get(model.perception, model.perception)}.",
+    )
