@@ -17,7 +17,7 @@ ROBOT_HEIGHTS = (0.03, 1.5)
 def obstacles(world: World) -> tuple[tuple[str, Box], ...]:
     """Returns the boxes that stop a robot on the floor, each with the name of its thing."""
     named = [("wall", box) for box in world.walls]
-    named += [(thing.name, box) for thing in world.objects for box in thing.boxes]
+    named += [(thing.name, box) for thing in world.objects if thing.solid for box in thing.boxes]
     low, high = ROBOT_HEIGHTS
     return tuple(
         (name, box)

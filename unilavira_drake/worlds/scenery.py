@@ -1,4 +1,4 @@
-"""Adds a world to a plant and its scene graph: few flat-shaded labelled meshes, solid boxes."""
+"""Adds a world to a plant and its scene graph: few labelled meshes, and solid boxes."""
 
 from __future__ import annotations
 
@@ -25,8 +25,16 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 
+from unilavira_drake.worlds import shell
+from unilavira_drake.worlds.furniture_library import (
+    furniture_mesh,
+    furniture_model,
+    furniture_models,
+)
+from unilavira_drake.worlds.gltf import TexturedQuads, textured_mesh
 from unilavira_drake.worlds.palette import PALETTE
-from unilavira_drake.worlds.world import Box, Room, World
+from unilavira_drake.worlds.panels import panel_quads
+from unilavira_drake.worlds.world import Box, Panel, Placement, Room, World, WorldObject
 
 Color = tuple[float, float, float]
 
@@ -39,36 +47,46 @@ _LIGHTS = ((-0.94, -0.90, -0.50), (0.86, 0.78, -0.50), (0.0, 0.0, 0.80))
 """Each light's direction of travel times its intensity: what a face square to an axis gets."""
 
 
-def lights(*, mirrored: bool = False) -> list[LightParameter]:
+_MATTE = math.pi
+"""A matte glTF surface shows 1/pi of its colour for a light that shows all of a flat one's."""
+
+
+def lights(*, mirrored: bool = False, textured: bool = False) -> list[LightParameter]:
     """Returns three lights that give each of the six directions of a box its own brightness.
 
     So every face is lit, edges stay visible, and a face square to the axes keeps between 0.78
     and 1.0 of its colour: enough to recognise the colour word.  Three cost 4 ms of CPU less an
     image than six on the axes.  The lights of a mirrored world are mirrored too.
+
+    Args:
+        mirrored: whether the world is.
+        textured: whether its surfaces are glTF materials.
     """
     sign = -1.0 if mirrored else 1.0
+    gain = _MATTE if textured else 1.0
     return [
         LightParameter(
             type="directional",
             frame="world",
             direction=(x, sign * y, z),
-            intensity=math.hypot(x, y, z),
+            intensity=gain * math.hypot(x, y, z),
         )
         for x, y, z in _LIGHTS
     ]
 
 
 @dataclass(frozen=True)
-class _Surface:
-    """Flat polygons of one colour and one label: (k, 4, 3) corners and (k, 3) normals."""
+class _Shape:
+    """A mesh with one label."""
 
     name: str
     label: int
-    color: Color
-    quads: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    solid: bool = True
-    """Shown to people too; a ceiling is not, it would hide the rooms from above."""
+    mesh: Mesh
+    X_WM: RigidTransform
+    color: Color | None = None
+    """Of a mesh without materials of its own."""
+    shown: bool = True
+    """To people, too; a ceiling is not, it would hide the rooms from above."""
 
 
 def add_scenery(plant: MultibodyPlant, scene_graph: SceneGraph, world: World) -> None:
@@ -79,7 +97,7 @@ def add_scenery(plant: MultibodyPlant, scene_graph: SceneGraph, world: World) ->
     """
     friction = CoulombFriction(0.5, 0.5)
     boxes = [("wall", box) for box in world.walls]
-    boxes += [(thing.name, box) for thing in world.objects for box in thing.boxes]
+    boxes += [(thing.name, box) for thing in world.objects if thing.solid for box in thing.boxes]
     for index, (name, box) in enumerate(boxes):
         p_WB: Any = box.center
         plant.RegisterCollisionGeometry(
@@ -89,27 +107,92 @@ def add_scenery(plant: MultibodyPlant, scene_graph: SceneGraph, world: World) ->
             f"{name}_{index}",
             friction,
         )
-    for surface in _surfaces(world):
-        _register(plant, scene_graph, surface)
+    for shape in _shapes(world):
+        _register(plant, scene_graph, shape)
 
 
-def _surfaces(world: World) -> Iterable[_Surface]:
+def scenery_triangles(world: World) -> int:
+    """Returns how many triangles the renderers have to draw for a textured world."""
+    models = furniture_models()
+    count = 0
+    for thing in world.objects:
+        if isinstance(thing.visual, Placement):
+            count += models[thing.visual.model].triangles
+        else:
+            count += 12 * len(thing.boxes)
+    for room in world.rooms:
+        walls = shell.walls(room, world.doorways, (), world.wall_height, world.wall_thickness)
+        count += 2 * (2 + sum(len(part.corners) for part in walls))
+    return count
+
+
+def _shapes(world: World) -> Iterable[_Shape]:
     for thing in world.objects:
         label = world.label_of(thing.name)
         assert label is not None
-        quads, normals = _box_quads(thing.boxes)
-        yield _Surface(thing.name, label, PALETTE[thing.color], quads, normals)
+        yield _thing(thing, label, textured=world.textured)
+    wall = world.label_of("walls")
+    assert wall is not None
     for room in world.rooms:
         label = world.label_of(f"{room.name}_floor")
         assert label is not None
-        quads, normals = _rectangles((room,), 0.0, up=True)
-        yield _Surface(f"{room.name}_floor", label, room.floor_color, quads, normals)
-    wall = world.label_of("walls")
-    assert wall is not None
-    quads, normals = _box_quads(world.walls)
-    yield _Surface("walls", wall, world.wall_color, quads, normals)
-    quads, normals = _rectangles(world.rooms, world.wall_height, up=False)
-    yield _Surface("ceiling", wall, world.wall_color, quads, normals, solid=False)
+        yield from (
+            _textured_room(world, room, label, wall)
+            if world.textured
+            else (_flat(f"{room.name}_floor", label, room.floor_color, *_rectangles((room,), 0.0)),)
+        )
+    if not world.textured:
+        yield _flat("walls", wall, world.wall_color, *_box_quads(world.walls))
+        quads, normals = _rectangles(world.rooms, world.wall_height)
+        yield _flat("ceiling", wall, world.wall_color, quads[:, ::-1], -normals, shown=False)
+
+
+def _thing(thing: WorldObject, label: int, *, textured: bool) -> _Shape:
+    visual = thing.visual
+    if isinstance(visual, Placement):
+        mesh = furniture_mesh(furniture_model(visual.model, thing.name), visual.color or None)
+        p_WM: Any = visual.position
+        return _Shape(thing.name, label, mesh, RigidTransform(RollPitchYaw(0, 0, visual.yaw), p_WM))
+    if isinstance(visual, Panel):
+        mesh = textured_mesh(thing.name, panel_quads(visual))
+        return _Shape(thing.name, label, mesh, RigidTransform())
+    quads, normals = _box_quads(thing.boxes)
+    color = PALETTE[thing.color]
+    if not textured:
+        return _flat(thing.name, label, color, quads, normals)
+    image = np.full((4, 4, 3), np.round(255 * np.array(color)), np.uint8)
+    plain = TexturedQuads(quads, np.full((len(quads), 4, 2), 0.5), image)
+    return _Shape(thing.name, label, textured_mesh(thing.name, [plain]), RigidTransform())
+
+
+def _textured_room(world: World, room: Room, floor: int, wall: int) -> Iterable[_Shape]:
+    boxes = [
+        box
+        for thing in world.objects
+        for box in thing.boxes
+        if thing.visual and room.contains(box.center[0], box.center[1])
+    ]
+    quads = shell.walls(room, world.doorways, boxes, world.wall_height, world.wall_thickness)
+    for name, label, parts, shown in (
+        (f"{room.name}_floor", floor, [shell.floor(room, boxes)], True),
+        (f"{room.name}_walls", wall, quads, True),
+        (f"{room.name}_ceiling", wall, [shell.ceiling(room, world.wall_height)], False),
+    ):
+        yield _Shape(name, label, textured_mesh(name, parts), RigidTransform(), shown=shown)
+
+
+def _flat(
+    name: str,
+    label: int,
+    color: Color,
+    quads: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    *,
+    shown: bool = True,
+) -> _Shape:
+    file = MemoryFile(_obj(quads, normals), ".obj", name)
+    mesh = Mesh(mesh_data=InMemoryMesh(mesh_file=file), scale=1.0)
+    return _Shape(name, label, mesh, RigidTransform(), color, shown)
 
 
 def _box_quads(boxes: Sequence[Box]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -122,42 +205,34 @@ def _box_quads(boxes: Sequence[Box]) -> tuple[NDArray[np.float64], NDArray[np.fl
     return np.concatenate(quads), np.concatenate(normals)
 
 
-def _rectangles(
-    rooms: Sequence[Room], z: float, *, up: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rectangles(rooms: Sequence[Room], z: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     quads = []
     for room in rooms:
         x_min, y_min, x_max, y_max = room.rectangle
-        loop = [(x_min, y_min, z), (x_max, y_min, z), (x_max, y_max, z), (x_min, y_max, z)]
-        quads.append(loop if up else loop[::-1])
-    normals = np.tile([0.0, 0.0, 1.0 if up else -1.0], (len(rooms), 1))
-    return np.array(quads, dtype=float), normals
+        quads.append([(x_min, y_min, z), (x_max, y_min, z), (x_max, y_max, z), (x_min, y_max, z)])
+    return np.array(quads, dtype=float), np.tile([0.0, 0.0, 1.0], (len(rooms), 1))
 
 
-def _register(plant: MultibodyPlant, scene_graph: SceneGraph, surface: _Surface) -> None:
-    mesh = Mesh(
-        mesh_data=InMemoryMesh(mesh_file=MemoryFile(_obj(surface), ".obj", surface.name)), scale=1.0
-    )
-    instance = GeometryInstance(RigidTransform(), mesh, f"scenery_{surface.name}")
-    rgba = Rgba(*surface.color, 1.0)
-    perception = PerceptionProperties()
-    perception.AddProperty("phong", "diffuse", rgba)
-    perception.AddProperty("label", "id", RenderLabel(surface.label))
+def _register(plant: MultibodyPlant, scene_graph: SceneGraph, shape: _Shape) -> None:
+    instance = GeometryInstance(shape.X_WM, shape.mesh, f"scenery_{shape.name}")
+    perception, illustration = PerceptionProperties(), IllustrationProperties()
+    perception.AddProperty("label", "id", RenderLabel(shape.label))
+    if shape.color is not None:
+        for properties in (perception, illustration):
+            properties.AddProperty("phong", "diffuse", Rgba(*shape.color, 1.0))
     instance.set_perception_properties(perception)
-    if surface.solid:
-        illustration = IllustrationProperties()
-        illustration.AddProperty("phong", "diffuse", rgba)
+    if shape.shown:
         instance.set_illustration_properties(illustration)
     source = plant.get_source_id()
     assert source is not None
     scene_graph.RegisterAnchoredGeometry(source, instance)
 
 
-def _obj(surface: _Surface) -> str:
-    """Returns the surface as the text of an .obj file, one normal a polygon."""
-    lines = ["v {:.5f} {:.5f} {:.5f}".format(*corner) for corner in surface.quads.reshape(-1, 3)]
-    lines += ["vn {:.5f} {:.5f} {:.5f}".format(*normal) for normal in surface.normals]
-    for i in range(len(surface.quads)):
+def _obj(quads: NDArray[np.float64], normals: NDArray[np.float64]) -> str:
+    """Returns the polygons as the text of an .obj file, one normal each."""
+    lines = ["v {:.5f} {:.5f} {:.5f}".format(*corner) for corner in quads.reshape(-1, 3)]
+    lines += ["vn {:.5f} {:.5f} {:.5f}".format(*normal) for normal in normals]
+    for i in range(len(quads)):
         a, b, c, d = (f"{4 * i + k}//{i + 1}" for k in (1, 2, 3, 4))
         lines += [f"f {a} {b} {c}", f"f {a} {c} {d}"]
     return "\n".join(lines) + "\n"

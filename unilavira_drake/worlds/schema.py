@@ -11,8 +11,11 @@ class RoomEntry:
     kind: str = ""
     # x_min, y_min, x_max, y_max between the walls' centre lines, metres.
     rectangle: list[float] = dc.field(default_factory=list)
-    # Red, green, blue in [0, 1].
+    # Red, green, blue in [0, 1]; of a floor without a material.
     floor_color: list[float] = dc.field(default_factory=lambda: [0.7, 0.7, 0.7])
+    # Materials, see worlds/materials.py: all rooms of a world have both, or none has.
+    floor: str = ""
+    walls: str = ""
 
 
 @dc.dataclass
@@ -27,23 +30,51 @@ class DoorEntry:
     width: float = 1.0
     # Colour word of the frame.
     color: str = "cyan"
+    # Whether the wall is missing there, up to the ceiling and without a frame: then it is no
+    # thing that anyone sees.
+    open: bool = False
 
 
 @dc.dataclass
 class ObjectEntry:
-    """A piece of furniture."""
+    """A piece of furniture: a model of the library, or boxes by its category."""
 
     name: str = ""
+    # A model of the furniture library; without one the category says what is built of boxes.
+    model: str = ""
+    # Of a model its own when empty.
     category: str = ""
-    # Colour word.
+    # Colour word; a model keeps its own colours when empty.
     color: str = ""
     room: str = ""
-    # Middle of the footprint, metres.
+    # Middle of the footprint, metres; one number along the wall of a model that stands at one.
     position: list[float] = dc.field(default_factory=list)
-    # At 0 the front looks along +x.
+    # north, south, east or west: the wall of the room to which a model turns its back.
+    wall: str = ""
+    # At 0 the front looks along +x, or away from the wall.
     yaw_degrees: float = 0.0
-    # Height of the surface it stands on, metres.
+    # Height of the surface it stands on, metres ...
     height: float = 0.0
+    # ... or the name of the piece, listed before, on which it stands.
+    stands_on: str = ""
+
+
+@dc.dataclass
+class PanelEntry:
+    """Something flat: on the nearest wall of its room, or a rug on the floor."""
+
+    name: str = ""
+    # window, picture, mirror, whiteboard or rug.
+    category: str = ""
+    # Colour word that fits what is drawn.
+    color: str = ""
+    room: str = ""
+    # Middle on the floor plan, metres.
+    position: list[float] = dc.field(default_factory=list)
+    # Width and height (of a rug: along x and y), metres.
+    size: list[float] = dc.field(default_factory=list)
+    # Lower edge above the floor, metres.
+    height: float = 0.9
 
 
 @dc.dataclass
@@ -58,3 +89,4 @@ class WorldFile:
     rooms: list[RoomEntry] = dc.field(default_factory=list)
     doors: list[DoorEntry] = dc.field(default_factory=list)
     objects: list[ObjectEntry] = dc.field(default_factory=list)
+    panels: list[PanelEntry] = dc.field(default_factory=list)

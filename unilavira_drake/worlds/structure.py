@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses as dc
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from unilavira_drake.worlds.world import Box, Room
-
-JAMB_WIDTH = 0.09
-"""Metres; jambs stand outside the clear width of a doorway."""
+from unilavira_drake.worlds.world import JAMB_WIDTH, Box, Doorway, Room
 
 JAMB_DEPTH = 0.20
 """Metres, across the wall."""
 
 DOOR_HEIGHT = 2.1
 """Clear height of a doorway, metres."""
-
-
-@dataclass(frozen=True)
-class Doorway:
-    """An opening in a wall."""
-
-    x: float
-    y: float
-    width: float
-    """Clear width, metres."""
-    along_x: bool
-    """Whether the wall runs along x."""
 
 
 @dataclass(frozen=True)
@@ -62,15 +48,13 @@ def wall_lines(rooms: Iterable[Room]) -> tuple[_Line, ...]:
     )
 
 
-def doorway(
-    x: float, y: float, width: float, rooms: tuple[Room, Room], thickness: float
-) -> Doorway | None:
-    """Returns the opening at (x, y), or None where both rooms do not share that wall."""
+def doorway(opening: Doorway, rooms: tuple[Room, Room], thickness: float) -> Doorway | None:
+    """Returns the opening with its wall's direction, or None where the rooms share no wall."""
     for along_x in (True, False):
-        across, along = (y, x) if along_x else (x, y)
-        reach = width / 2 + JAMB_WIDTH + thickness / 2
+        across, along = (opening.y, opening.x) if along_x else (opening.x, opening.y)
+        reach = opening.gap + thickness / 2
         if all(_borders(room, along_x, across, along - reach, along + reach) for room in rooms):
-            return Doorway(x, y, width, along_x)
+            return dc.replace(opening, along_x=along_x)
     return None
 
 
@@ -86,10 +70,11 @@ def walls(
         cursor, end = line.start - grow, line.end + grow
         for opening in _on_line(line, openings):
             middle = opening.x if line.along_x else opening.y
-            half = opening.width / 2 + JAMB_WIDTH
+            half = opening.gap
             boxes.append(_part(line, cursor, middle - half).box(0.0, height, thickness))
-            lintel = _part(line, middle - half, middle + half)
-            boxes.append(lintel.box(DOOR_HEIGHT + JAMB_WIDTH, height, thickness))
+            if not opening.open:
+                lintel = _part(line, middle - half, middle + half)
+                boxes.append(lintel.box(DOOR_HEIGHT + JAMB_WIDTH, height, thickness))
             cursor = middle + half
         boxes.append(_part(line, cursor, end).box(0.0, height, thickness))
     return tuple(boxes)

@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 
 from unilavira_drake.messages import Message
 
+JAMB_WIDTH = 0.09
+"""Metres; jambs stand outside the clear width of a doorway."""
+
 
 @dataclass(frozen=True)
 class Box(Message):
@@ -34,6 +37,52 @@ class Box(Message):
 
 
 @dataclass(frozen=True)
+class Doorway(Message):
+    """An opening in a wall."""
+
+    x: float = 0.0
+    y: float = 0.0
+    width: float = 1.0
+    """Clear width, metres."""
+    along_x: bool = True
+    """Whether the wall runs along x."""
+    open: bool = False
+    """Whether the wall is missing up to the ceiling; else there is a frame and a lintel."""
+
+    @property
+    def gap(self) -> float:
+        """Half of what is missing from the wall, metres."""
+        return self.width / 2 + (0.0 if self.open else JAMB_WIDTH)
+
+
+@dataclass(frozen=True)
+class Placement(Message):
+    """A model of the furniture library and where it stands."""
+
+    model: str = ""
+    color: str = ""
+    """Colour word of its main material; empty keeps the model's own."""
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Metres; of the middle of its footprint."""
+    yaw: float = 0.0
+    """Radians; at 0 the front looks along +x."""
+
+
+@dataclass(frozen=True)
+class Panel(Message):
+    """A flat thing with a picture on it: a window, a painting, a rug."""
+
+    pattern: str = "picture"
+    color: str = ""
+    """Colour word of what is drawn."""
+    box: Box = Box()
+    """Thin along the direction that it faces."""
+    facing: float | None = None
+    """Yaw of the side that shows the picture, radians; None faces up."""
+    seed: int = 0
+
+
+@dataclass(frozen=True)
 class Room(Message):
     """A rectangular room."""
 
@@ -43,6 +92,10 @@ class Room(Message):
     """(x_min, y_min, x_max, y_max) between the walls' centre lines, metres."""
     floor_color: tuple[float, float, float] = (0.7, 0.7, 0.7)
     """Red, green, blue of the floor, each in [0, 1]."""
+    floor: str = ""
+    """Material of the floor; empty where the world is flat-shaded."""
+    walls: str = ""
+    """Material of the walls."""
 
     def contains(self, x: float, y: float) -> bool:
         """Whether a point of the floor lies in this room."""
@@ -58,7 +111,7 @@ class Room(Message):
 
 @dataclass(frozen=True)
 class WorldObject(Message):
-    """A labelled thing: furniture or a door frame (category ``door``)."""
+    """A labelled thing: furniture, a panel, or a door frame (category ``door``)."""
 
     name: str = ""
     category: str = ""
@@ -67,7 +120,10 @@ class WorldObject(Message):
     room: str = ""
     """Name of the room; for a door the two names joined by ``|``."""
     boxes: tuple[Box, ...] = ()
-    """Visible geometry and collision geometry, in the world."""
+    """Collision geometry in the world; visible, too, where there is no ``visual``."""
+    visual: Placement | Panel | None = None
+    solid: bool = True
+    """Whether a robot collides with it."""
 
 
 @dataclass(frozen=True)
@@ -88,14 +144,22 @@ class World(Message):
     rooms: tuple[Room, ...] = ()
     objects: tuple[WorldObject, ...] = ()
     walls: tuple[Box, ...] = ()
+    doorways: tuple[Doorway, ...] = ()
     labels: dict[int, LabelEntry] = field(default_factory=dict)
     """Render label -> meaning; every labelled geometry has an entry."""
     wall_height: float = 2.6
     """Metres; the ceiling lies there."""
     wall_color: tuple[float, float, float] = (0.9, 0.9, 0.9)
-    """Red, green, blue of walls and ceiling, each in [0, 1]."""
+    """Red, green, blue of walls and ceiling, each in [0, 1]; of a world without materials."""
+    wall_thickness: float = 0.1
+    """Metres."""
     mirrored: bool = False
     """Whether y was negated when the world was read; starts and goals given as numbers follow."""
+
+    @property
+    def textured(self) -> bool:
+        """Whether floors and walls have materials."""
+        return any(room.floor for room in self.rooms)
 
     def room_at(self, x: float, y: float) -> Room | None:
         """Returns the room that holds a point of the floor, or None outside."""

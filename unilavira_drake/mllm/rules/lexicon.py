@@ -69,6 +69,7 @@ _PHRASES: dict[tuple[str, str], str] = {
     "neighbouring room|neighboring room|room",
     ("home", ""): "flat|apartment|house|home|building|place|environment|rooms",
     ("it", ""): "it|there|them",
+    ("one", ""): "one|ones",
     ("ordinal", "1"): "first|1st|nearest|closest",
     ("ordinal", "2"): "second|2nd",
     ("ordinal", "3"): "third|3rd",
@@ -146,7 +147,6 @@ _COURTESY = frozenset(
         "up",
         "immediately",
         "simply",
-        "one",
     ]
 )
 

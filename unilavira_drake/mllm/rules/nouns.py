@@ -21,7 +21,7 @@ class Noun:
     side: str = ""
     ordinal: int = 0
     generic: str = ""
-    """``here`` (this room) or ``next`` (another room)."""
+    """``here`` (this room), ``next`` (another room) or ``one`` (the thing spoken of)."""
 
     @property
     def is_room(self) -> bool:
@@ -44,6 +44,9 @@ def read_noun(tokens: list[Token], start: int) -> tuple[Noun, int] | None:
             ordinal = int(token.value)
         elif token.kind == "side" and i > 0 and tokens[i - 1].kind in ("article", "ordinal"):
             side = token.value
+        elif token.kind == "one":
+            said = color or side or ordinal
+            return (Noun("", "", color, side, ordinal, "one"), i + 1) if said else None
         elif token.kind in ("thing", "room", "here", "next_room"):
             noun, end = _head(tokens, i)
             return (

@@ -149,10 +149,10 @@ def _open_cost(situation: Situation, aim: Aim, direction: str, free: float) -> f
         return cost + 20.0
     if is_hub(room):
         return cost - 2.0 + (3.0 if direction == "back" and aim.turn is None else 0.0)
-    if aim.inside and aim.inside == room:
-        return cost
     floors = [f for f in situation.scene.floors if f.direction == direction]
     ahead = max(floors, key=lambda f: f.pixels).room if floors else ""
     if _on_threshold(situation) and ahead == room and goal is not None and goal.category:
         return cost - 12.0
+    if aim.inside and aim.inside == room:
+        return cost
     return 11.0 - 2.0 * max(0.0, free - 4.0)

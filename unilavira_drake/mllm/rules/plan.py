@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from unilavira_drake.messages import TodoItem
 from unilavira_drake.mllm.rules.clauses import Clause, describe
+from unilavira_drake.mllm.rules.lexicon import tokenize
 from unilavira_drake.mllm.rules.memory import Place
 from unilavira_drake.mllm.rules.parser import parse
 
@@ -84,7 +85,8 @@ def steps_from_history(
 
 
 def _question(task: str) -> tuple[Clause, ...]:
+    """Rooms that a question names are gone to first: they say which of several things is meant."""
     text = task.lower().strip(" ?.")
-    clauses = tuple(c for c in parse(f"find {text}") if c.kind in ("go", "enter"))
-    things = [c for c in clauses if c.category]
-    return (*(c for c in clauses if c.kind == "enter"), *things[:1])
+    things = [c for c in parse(f"find {text}") if c.kind == "go" and c.category]
+    rooms = dict.fromkeys(token.value for token in tokenize(text) if token.kind == "room")
+    return (*(Clause("enter", room=room) for room in rooms), *things[:1])

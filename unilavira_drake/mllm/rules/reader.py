@@ -146,6 +146,10 @@ class Reader:
             self._noun(self._thing)
 
     def _noun(self, noun: Noun) -> None:
+        if noun.generic == "one":
+            if not self._thing.category:
+                return
+            noun = dataclasses.replace(noun, category=self._thing.category, generic="")
         if noun.category == DOOR:
             noun = self._resolved_door(noun)
             self._door = noun

@@ -89,8 +89,7 @@ def _thing(view: ViewEvidence, name: str, distance: float, bearing: float) -> di
         middle, foot = (d.box[0] + d.box[2]) / 2, min(d.box[3], view.height - 1.0) - 2.0
         return _reply(name, "the floor in the opening", point=[middle, foot])
     if d.distance > _FAR:
-        floor = _open_floor(view, _STRIDE, _degrees(view, (d.box[0] + d.box[2]) / 2))
-        return {**floor, "target_desc": f"floor towards the {name}"}
+        return _towards(view, f"the {name}", _degrees(view, (d.box[0] + d.box[2]) / 2))
     area = (d.box[2] - d.box[0]) * (d.box[3] - d.box[1])
     if d.pixels < _FILLED * area:
         # Most of the box shows what is behind a thin thing.
@@ -109,7 +108,14 @@ def _floor(view: ViewEvidence, room: str, bearing: float) -> dict[str, Any]:
     floor = _floor_of(view, room, bearing)
     if floor is None:
         return _nothing(f"no floor of the {room} in this view")
+    if floor.point_distance > _FAR:
+        return _towards(view, f"the {room}", _degrees(view, floor.point[0]))
     return _reply(f"floor of the {room}", f"detection {floor.id}", point=[*floor.point])
+
+
+def _towards(view: ViewEvidence, what: str, bearing: float) -> dict[str, Any]:
+    """Selects floor on the way to what is too far for the depth camera."""
+    return {**_open_floor(view, _STRIDE, bearing), "target_desc": f"floor towards {what}"}
 
 
 def _beyond(view: ViewEvidence, room: str, distance: float, bearing: float) -> dict[str, Any]:
@@ -117,6 +123,8 @@ def _beyond(view: ViewEvidence, room: str, distance: float, bearing: float) -> d
     floor = _floor_of(view, room, bearing)
     if floor is None:
         return _nothing(f"no floor of the {room} in this view")
+    if floor.point_distance > _FAR and distance > _STRIDE:
+        return _towards(view, f"the {room}", bearing)
     camera = FloorCamera.fit([view])
     goal = distance + (_INSIDE_HUB if room in HUBS else _INSIDE)
     u_min, v_min, u_max, v_max = floor.box
