@@ -2,7 +2,7 @@
 
 from unilavira_drake import load_scenario, run_episode
 
-scenario = load_scenario("flat", overlay="task: {text: '@fridge'}")
+scenario = load_scenario("apartment", overlay="task: {text: '@fridge'}")
 result = run_episode(scenario, on_event=lambda t, system, event, _: print(f"{t:6.2f} {system}"))
 
 print(result.cause, result.success, result.metrics)

@@ -16,7 +16,7 @@ LAYERS = (
     ("errors", "resources", "kernels"),
     ("messages",),
     ("tasks", "mllm"),
-    ("ports", "planning", "mapping", "language", "memory", "vision", "sensors", "worlds"),
+    ("ports", "planning", "mapping", "language", "memory", "vision", "sensors", "worlds", "raster"),
     ("model_link", "rendering_check"),
     ("robots",),
     ("scenario", "scenario_schema", "task_choice"),
@@ -24,7 +24,7 @@ LAYERS = (
     ("station", "agent", "navigation"),
     ("recording",),
     ("diagram", "evaluation"),
-    ("episode_result",),
+    ("episode_result", "report"),
     ("episode",),
     ("cli",),
 )

@@ -129,7 +129,11 @@ def test_a_file_s_mistake_is_told_with_its_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "fragment"),
-    [("flta", "did you mean 'flat'"), ("no/such.yaml", "no file"), ("", "valid: flat")],
+    [
+        ("flta", "did you mean 'flat'"),
+        ("no/such.yaml", "no file"),
+        ("", "valid: apartment, flat, office"),
+    ],
 )
 def test_an_unknown_scenario_is_told(name: str, fragment: str) -> None:
     with pytest.raises(ScenarioError, match=fragment):

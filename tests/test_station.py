@@ -225,7 +225,9 @@ def test_images_are_rendered_only_when_pulled(monkeypatch):
         render(self, name, context, output)
 
     monkeypatch.setattr(SceneCamera, "_render", counted)
-    rig = Rig()
+    scenario = small_scenario()
+    scenario.renderer = "vtk"
+    rig = Rig(scenario)
     rig.drive(0.5, 0.3, 0.0, 0.0)
     assert drawn == []
     rig.read("front.depth_image")
@@ -235,6 +237,7 @@ def test_images_are_rendered_only_when_pulled(monkeypatch):
 
 def test_the_scenario_alone_is_enough():
     scenario = small_scenario()
+    scenario.world = WorldChoice(name="flat")
     scenario.tasks = {"go": NamedTask(text="Go to the red sofa.", start="kitchen")}
     scenario.default_task = "go"
     rig = Rig(scenario, world=None, start=None)

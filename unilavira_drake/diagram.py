@@ -169,6 +169,7 @@ def _close_the_ring(wiring: Wiring) -> None:
 def _listen(wiring: Wiring, *, todo: bool) -> None:
     wiring.connect("observer", "panorama", "recorder")
     wiring.connect("navigation", "navigation_status", "recorder")
+    wiring.connect("navigation", "map", "recorder")
     wiring.connect("episode_monitor", "metrics", "recorder")
     for port in ("language_action", "vision_action", "goal"):
         wiring.connect("agent", port, "recorder")

@@ -15,6 +15,8 @@ from pydrake.systems.framework import Context, Diagram, System
 
 from unilavira_drake.diagram import make_navigation_diagram
 from unilavira_drake.episode_result import episode_result
+from unilavira_drake.evaluation.answers import judge_answer
+from unilavira_drake.evaluation.goal_area import success_area
 from unilavira_drake.evaluation.scoring import GoalField, make_goal_field, score, shortest_path
 from unilavira_drake.messages import Frame
 from unilavira_drake.mllm.evidence import ViewEvidence
@@ -76,14 +78,24 @@ def run_episode(
             listeners.append(folder.record)
         episode.simulate()
         verdict = score(goal, episode.metrics, start[:2], episode.output("observer", "panorama"))
+        if task.answers:
+            stopped = episode.metrics.cause == "stopped"
+            verdict = judge_answer(verdict, tally.answer, task.answers, stopped=stopped)
         result = episode_result(scenario, task, episode.metrics, verdict, tally)
         if folder is not None:
             folder.write("result.json", result.to_json())
             folder.write("timings.json", json.dumps(episode.timings, indent=2) + "\n")
             occupancy = episode.output("navigation", "map")
             goals = () if goal is None else goal.places
-            title = task.spec.text
-            folder.write("map.png", map_picture(world, trace, occupancy, goals=goals, title=title))
+            picture = map_picture(
+                world,
+                trace,
+                occupancy,
+                goals=goals,
+                goal_area=() if goal is None else success_area(goal),
+                title=task.spec.text,
+            )
+            folder.write("map.png", picture)
     return result
 
 

@@ -48,6 +48,7 @@ def episode_result(
             collisions=metrics.collisions,
             max_contact_force_n=round(metrics.max_contact_force, 3),
             answer=tally.answer or None,
+            answer_correct=verdict.answer_correct,
         ),
         counts=tally.counts(metrics.decisions),
         usage=tally.usage,

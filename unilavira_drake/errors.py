@@ -5,6 +5,7 @@ The tree::
     UniLaviraError
     ├── InputError            a person's input is wrong (exit code 2)
     │   ├── ScenarioError     a scenario file, overlay or flag
+    │   ├── GeometryError     a geometry that a camera cannot draw
     │   └── TaskError         a task text, start or goal
     ├── InfrastructureError   the machine or a service is not able (exit code 3)
     │   ├── RenderingError    no usable renderer
@@ -32,6 +33,10 @@ class InputError(UniLaviraError):
 
 class ScenarioError(InputError):
     """A scenario file, overlay or command-line flag cannot be used."""
+
+
+class GeometryError(InputError):
+    """A geometry cannot be drawn: a broken or missing file, or an unsupported shape."""
 
 
 class TaskError(InputError):
@@ -62,9 +67,20 @@ class PortTypeError(UniLaviraError, TypeError):
     """A port is unconnected, or carries another type than its reader expects."""
 
 
+MOST_NAMES = 30
+"""Names that a message lists at most."""
+
+
 def unknown_name(kind: str, name: str, valid: Iterable[str], place: str) -> str:
-    """Returns a message for an unknown name, with the nearest valid one as the remedy."""
+    """Returns a message for an unknown name, with the nearest valid one as the remedy.
+
+    Of more names than a person would read it lists the nearest ones.
+    """
     names = sorted(valid)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     remedy = f"did you mean {near[0]!r}? " if near else ""
-    return f"{place}: unknown {kind} {name!r}; {remedy}valid: {', '.join(names) or 'none'}."
+    rest = ""
+    if len(names) > MOST_NAMES:
+        rest = f" ... ({len(names)} in all)"
+        names = sorted(difflib.get_close_matches(name, names, n=MOST_NAMES // 2, cutoff=0.0))
+    return f"{place}: unknown {kind} {name!r}; {remedy}valid: {', '.join(names) or 'none'}{rest}."

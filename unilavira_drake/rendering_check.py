@@ -2,7 +2,7 @@
 
 A missing driver makes VTK crash with a segmentation fault, and a missing library makes the import
 of Drake fail; neither can be caught in the process that needs the picture.  Run as
-``python -m unilavira_drake.rendering_check``.
+``python -m unilavira_drake.rendering_check [vtk|raster]``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from unilavira_drake.errors import RenderingError
 
 PACKAGES = ("libglib2.0-0", "libegl1", "libgl1-mesa-dri")
-"""What Drake's renderer needs from a Debian or Ubuntu system without a screen."""
+"""What both renderers need from a Debian or Ubuntu system without a screen."""
 
 REMEDY = f"sudo apt-get install -y --no-install-recommends {' '.join(PACKAGES)}"
 
@@ -33,17 +33,20 @@ _CAUSES = (
 _CRASHES = (-signal.SIGSEGV, 128 + signal.SIGSEGV, -signal.SIGABRT, 128 + signal.SIGABRT)
 
 
-def check_rendering(command: Sequence[str] | None = None, *, timeout: float = 120.0) -> None:
+def check_rendering(
+    command: Sequence[str] | None = None, *, renderer: str = "vtk", timeout: float = 120.0
+) -> None:
     """Renders one tiny picture in a subprocess; takes about a second.
 
     Args:
         command: what to run; this module by default.
+        renderer: ``vtk`` or ``raster``; where the latter cannot draw, the former has to.
         timeout: wall-clock seconds.
 
     Raises:
         RenderingError: with the cause and the exact command that repairs it.
     """
-    arguments = list(command or (sys.executable, "-m", "unilavira_drake.rendering_check"))
+    arguments = list(command or (sys.executable, "-m", "unilavira_drake.rendering_check", renderer))
     try:
         done = subprocess.run(
             arguments, capture_output=True, text=True, errors="replace", timeout=timeout
@@ -74,8 +77,65 @@ def diagnose(returncode: int, stdout: str, stderr: str) -> str:
     return f"rendering: {cause}. Install what it needs: {REMEDY}"
 
 
-def _render() -> None:
+def _render(renderer: str) -> None:
     """Renders a red box and checks the middle pixel."""
+    if renderer == "raster":
+        try:
+            _check_red(_raster_pixels())
+            return
+        except RenderingError as error:
+            print(f"{error}; VTK has to draw", file=sys.stderr)
+    _check_red(_vtk_pixels())
+
+
+def _check_red(pixels: Any) -> None:
+    red, green, blue, _ = (int(value) for value in pixels[6, 8])
+    if not red > 100 > max(green, blue):
+        raise SystemExit(f"the test picture is wrong: its middle is {(red, green, blue)}, not red")
+    print(_SUCCESS)
+
+
+def _raster_pixels() -> Any:
+    from pydrake.geometry import (
+        Box,
+        ClippingRange,
+        DepthRange,
+        GeometryInstance,
+        PerceptionProperties,
+        RenderCameraCore,
+        Rgba,
+        SceneGraph,
+    )
+    from pydrake.math import RigidTransform
+    from pydrake.systems.framework import DiagramBuilder
+    from pydrake.systems.sensors import CameraInfo
+
+    from unilavira_drake.raster import RasterCamera, RasterCameraConfig, RasterView
+    from unilavira_drake.raster.stage import shared_stage
+
+    builder = DiagramBuilder()
+    scene_graph: Any = builder.AddSystem(SceneGraph())
+    p_CB: Any = [0.0, 0.0, 2.0]
+    box = GeometryInstance(RigidTransform(p_CB), Box(1.0, 1.0, 1.0), "box")
+    properties = PerceptionProperties()
+    properties.AddProperty("phong", "diffuse", Rgba(1.0, 0.0, 0.0, 1.0))
+    box.set_perception_properties(properties)
+    scene_graph.RegisterAnchoredGeometry(scene_graph.RegisterSource("check"), box)
+    core = RenderCameraCore(
+        "raster",
+        CameraInfo(16, 12, 10.0, 10.0, 8.0, 6.0),
+        ClippingRange(0.1, 9.0),
+        RigidTransform(),
+    )
+    view = RasterView(scene_graph.world_frame_id(), RigidTransform(), core, DepthRange(0.1, 9.0))
+    camera: Any = builder.AddSystem(RasterCamera(shared_stage(), RasterCameraConfig((view,))))
+    builder.Connect(scene_graph.get_query_output_port(), camera.query_object_input_port())
+    diagram = builder.Build()
+    context = camera.GetMyContextFromRoot(diagram.CreateDefaultContext())
+    return camera.frames(context)[0].color
+
+
+def _vtk_pixels() -> Any:
     from pydrake.geometry import (
         Box,
         ClippingRange,
@@ -103,11 +163,8 @@ def _render() -> None:
     )
     image: Any = ImageRgba8U(16, 12)
     engine.RenderColorImage(ColorRenderCamera(core, False), image)
-    red, green, blue, _ = (int(value) for value in image.data[6, 8])
-    if not red > 100 > max(green, blue):
-        raise SystemExit(f"the test picture is wrong: its middle is {(red, green, blue)}, not red")
-    print(_SUCCESS)
+    return image.data.copy()
 
 
 if __name__ == "__main__":
-    _render()
+    _render(sys.argv[1] if len(sys.argv) > 1 else "vtk")

@@ -16,14 +16,14 @@ from unilavira_drake.robots.cobot_magic import CobotMagic
 
 # What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both.
 ABLATIONS = ("full", "no_tdm", "no_scb", "no_both")
-RENDERERS = ("vtk",)
+RENDERERS = ("vtk", "raster")
 
 
 @dc.dataclass
 class WorldChoice:
     """Which world, and whether it is mirrored."""
 
-    name: str = "flat"
+    name: str = "apartment"
     # Mirrors the world and every start in the x axis (y -> -y).
     mirror: bool = False
 
@@ -92,7 +92,8 @@ class Scenario:
     )
     # full | no_tdm | no_scb | no_both.
     ablation: str = "full"
-    renderer: str = "vtk"
+    # vtk | raster.
+    renderer: str = "raster"
     meshcat: bool = False
     # Period of every level of the ring, seconds.
     tick: float = 0.1

@@ -11,13 +11,19 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import ConstantValueSource
 
+from unilavira_drake.raster import raster_works
 from unilavira_drake.resources import package_xml
 from unilavira_drake.robots.planar_base import PlanarBase
 from unilavira_drake.scenario import Scenario
-from unilavira_drake.sensors.rig import add_renderer, add_rgbd_camera, front_intrinsics
+from unilavira_drake.sensors.rig import (
+    add_raster_rgbd_camera,
+    add_renderer,
+    add_rgbd_camera,
+    front_intrinsics,
+)
 from unilavira_drake.sensors.scene_camera import SceneCamera
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.worlds.load import load_world
@@ -76,7 +82,8 @@ def make_navigation_station(
         - contact_results
         - cheat_X_WB
 
-    Images are rendered only when pulled, by one renderer for all clones of a Context.
+    Images are rendered only when pulled, by one renderer for all clones of a Context:
+    ``scenario.renderer`` says which.
     ``cheat_X_WB`` is the true pose: for scoring only.
 
     Args:
@@ -99,7 +106,11 @@ def make_navigation_station(
     q: Any = np.array(start)
     plant.SetDefaultPositions(robot, q)
     _add_base(builder, plant, robot)
-    _add_front_camera(builder, plant, scenario, world)
+    if scenario.renderer == "raster" and raster_works():
+        camera, X_BC = _raster_camera(builder, plant, scene_graph, scenario, world)
+    else:
+        camera, X_BC = _vtk_camera(builder, plant, scenario, world)
+    _export_front_camera(builder, camera, X_BC)
     builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
     if scenario.meshcat:
         _add_meshcat(builder, scene_graph)
@@ -140,14 +151,45 @@ def _add_base(builder: DiagramBuilder, plant: MultibodyPlant, robot: ModelInstan
         builder.ExportOutput(base.GetOutputPort(port), name)
 
 
-def _add_front_camera(
+def _raster_camera(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    scenario: Scenario,
+    world: World,
+) -> tuple[System, RigidTransform]:
+    """Adds our own camera, whose pictures depend on positions alone; a clone shares them."""
+    robot = scenario.robot
+    return add_raster_rgbd_camera(
+        builder,
+        plant,
+        scene_graph,
+        frame_name="front_camera",
+        intrinsics=front_intrinsics(robot),
+        min_depth=robot.min_depth,
+        max_depth=robot.max_depth,
+        lights=lights(mirrored=world.mirrored),
+    )
+
+
+def _vtk_camera(
     builder: DiagramBuilder, plant: MultibodyPlant, scenario: Scenario, world: World
-) -> None:
+) -> tuple[System, RigidTransform]:
+    """Adds Drake's camera, on a scene of its own that serves all clones."""
     scene, X_BC = _picture_scene(scenario, world)
     camera = builder.AddNamedSystem("front_camera", SceneCamera(scene))
     builder.Connect(plant.get_state_output_port(), camera.GetInputPort("plant_state"))
-    for port in ("color_image", "depth_image", "label_image"):
-        builder.ExportOutput(camera.GetOutputPort(port), f"front.{port}")
+    return camera, X_BC
+
+
+def _export_front_camera(builder: DiagramBuilder, camera: System, X_BC: RigidTransform) -> None:
+    depth = "depth_image_32f" if camera.HasOutputPort("depth_image_32f") else "depth_image"
+    for port, name in (
+        ("color_image", "color_image"),
+        (depth, "depth_image"),
+        ("label_image", "label_image"),
+    ):
+        builder.ExportOutput(camera.GetOutputPort(port), f"front.{name}")
     mount = builder.AddNamedSystem("front_mount", ConstantValueSource(AbstractValue.Make(X_BC)))
     builder.ExportOutput(mount.get_output_port(), "front.X_BC")
 
@@ -157,7 +199,7 @@ def _picture_scene(scenario: Scenario, world: World) -> tuple[Diagram, RigidTran
     robot = scenario.robot
     builder = DiagramBuilder()
     plant, scene_graph, _ = _add_scene(builder, scenario, world)
-    add_renderer(scene_graph, lights(mirrored=world.mirrored))
+    add_renderer(scene_graph, lights(mirrored=world.mirrored, textured=world.textured))
     sensor, X_BC = add_rgbd_camera(
         builder,
         plant,

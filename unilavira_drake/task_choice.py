@@ -18,7 +18,9 @@ class EpisodeTask:
     """Name in the scenario; empty for free text."""
     start: str
     goal: str
-    """Empty when the episode is not scored."""
+    """Empty when the place is not scored."""
+    answers: tuple[str, ...] = ()
+    """Answers that count, of a question; empty when none is scored."""
 
 
 def choose_task(scenario: Scenario) -> EpisodeTask:
@@ -47,6 +49,7 @@ def choose_task(scenario: Scenario) -> EpisodeTask:
         name=name,
         start=choice.start or task.start or scenario.start,
         goal=choice.goal or task.goal,
+        answers=(task.answer, *task.accept) if task.answer else (),
     )
 
 

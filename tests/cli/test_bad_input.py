@@ -33,7 +33,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (["--task", "  \n"], ["task", "empty"]),
         (["--task", "go " * 2001], ["2001 words", "2000"]),
         (["--ablation", "no_tmd"], ["'no_tmd'", "did you mean 'no_tdm'"]),
-        (["--renderer", "raster"], ["unknown renderer 'raster'", "vtk"]),
+        (["--renderer", "vulkan"], ["unknown renderer 'vulkan'", "vtk"]),
         (["--start", "kichen"], ["start", "did you mean 'kitchen'"]),
         (["--start", "5.0,2.9,0"], ["start", "'5.0,2.9,0'", "nearest free place"]),
         (["--start", "-9,0,0"], ["start", "outside the world"]),

@@ -34,10 +34,12 @@ def test_a_run_tells_its_story_and_leaves_its_folder(capsys: pytest.CaptureFixtu
     assert "not a multimodal LLM" in out
     assert "no success: decision_budget" in out
     assert out.count("\n  unilavira ") == 3
-    folder = Path("runs/flat-fridge-1")
+    assert "\n  unilavira report runs/apartment-fridge-1\n" in out
+    folder = Path("runs/apartment-fridge-1")
     assert {path.name for path in folder.iterdir()} == {
         "frames",
         "map.png",
+        "maps",
         "result.json",
         "scenario.yaml",
         "timings.json",

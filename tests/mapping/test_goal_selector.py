@@ -6,6 +6,7 @@ from pydrake.common.value import AbstractValue
 
 from unilavira_drake.errors import PortTypeError
 from unilavira_drake.mapping.goal_selector import NO_STAIRS, GoalSelector
+from unilavira_drake.mapping.projection import project_to_pixel
 from unilavira_drake.messages import (
     Frame,
     Goal,
@@ -102,6 +103,14 @@ def test_a_box_becomes_a_point_of_the_world():
 def test_a_point_becomes_a_point_of_the_world():
     goal = goal_of(turn(), VisionAction(n=4, direction="front", point=(51.5, 43.5)))
     assert goal.p_WG == pytest.approx((4.0, 2.0 - 1.5, 0.88 - 1.5))
+    assert goal.pixel == (51.5, 43.5)
+
+
+def test_a_goal_names_the_pixel_that_stands_for_its_box():
+    goal = goal_of(turn(), VisionAction(n=4, direction="front", box=(11, 21, 33, 43)))
+    assert goal.pixel == (21.5, 31.5)
+    x, y, _ = project_to_pixel(goal.p_WG, intrinsics=LENS, X_WC=PANORAMA.frame("front").X_WC)
+    assert (x, y) == pytest.approx(goal.pixel)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from unilavira_drake.recording.result import installed_versions
 from unilavira_drake.rendering_check import check_rendering
 from unilavira_drake.resources import models_path, prompts_path
+from unilavira_drake.scenario import RENDERERS
 
 
 def doctor() -> None:
@@ -13,5 +14,6 @@ def doctor() -> None:
         print(f"ok  {name} {version}")
     for folder in (models_path(), prompts_path()):
         print(f"ok  {folder}")
-    check_rendering()
-    print("ok  rendering")
+    for renderer in RENDERERS:
+        check_rendering(renderer=renderer)
+        print(f"ok  rendering with {renderer}")

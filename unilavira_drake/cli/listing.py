@@ -20,14 +20,22 @@ from rich.table import Table
 from unilavira_drake.diagram import make_navigation_diagram
 from unilavira_drake.scenario_checks import robot_names
 from unilavira_drake.scenario_loading import load_scenario, scenario_names
+from unilavira_drake.worlds.furniture_library import furniture_licences, furniture_models
 from unilavira_drake.worlds.load import load_world
 
 _OPAQUE = "station"
 """Drake's own plant and renderer are inside; its ports say what there is to know."""
 
 
-def scenarios() -> None:
-    """Lists scenarios with their named tasks, worlds and robots."""
+def scenarios(
+    furniture: Annotated[
+        bool, typer.Option("--furniture", help="The furniture that worlds can use, instead.")
+    ] = False,
+) -> None:
+    """Lists scenarios with their named tasks, worlds and robots; or the furniture library."""
+    if furniture:
+        _furniture()
+        return
     console = Console(soft_wrap=True, highlight=False)
     for name in scenario_names():
         scenario = load_scenario(name)
@@ -41,8 +49,25 @@ def scenarios() -> None:
     console.print(f"robots: {', '.join(robot_names())}", markup=False)
 
 
+def _furniture() -> None:
+    table = Table("name", "category", "size x, y, z [m]", "colour", "triangles", "licence")
+    licences = furniture_licences()
+    for name, model in furniture_models().items():
+        size = " x ".join(f"{length:.2f}" for length in model.size)
+        row = (name, model.category, size, model.color, str(model.triangles), licences[name])
+        table.add_row(*row)
+    console = _table_console()
+    console.print(table)
+    console.print("Authors and changes of each: models/furniture/ATTRIBUTION.csv", markup=False)
+
+
+def _table_console() -> Console:
+    """A file has no width: nothing is cut there."""
+    return Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+
+
 def ports(
-    scenario: Annotated[str, typer.Option(help="Name or file of the scenario.")] = "flat",
+    scenario: Annotated[str, typer.Option(help="Name or file of the scenario.")] = "apartment",
     dot: Annotated[bool, typer.Option("--dot", help="Graphviz text instead of a table.")] = False,
     depth: Annotated[int, typer.Option(help="Levels of detail in the Graphviz text.")] = 2,
 ) -> None:
@@ -54,8 +79,7 @@ def ports(
     table = Table("system", "direction", "port", "carries")
     for row in _rows(diagram):
         table.add_row(*row)
-    # A file has no width: nothing is cut there.
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    _table_console().print(table)
 
 
 def _ignore(t: float, system: str, event: str, message: object) -> None:

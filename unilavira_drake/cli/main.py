@@ -19,6 +19,7 @@ import typer
 
 from unilavira_drake.cli.doctor import doctor
 from unilavira_drake.cli.listing import ports, scenarios
+from unilavira_drake.cli.report import report
 from unilavira_drake.cli.run import run
 from unilavira_drake.errors import InfrastructureError, InputError
 
@@ -31,7 +32,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (run, ports, scenarios, doctor):
+for command in (run, report, ports, scenarios, doctor):
     app.command()(command)
 
 

@@ -38,7 +38,9 @@ def run(
         str | None, _option("Scores the task against this.", "INSTANCE|ROOM|X,Y")
     ] = None,
     start: Annotated[str | None, _option("Where the robot starts.", "ROOM|X,Y,YAW")] = None,
-    scenario: Annotated[str, _option("Name or file; default: flat.", "NAME|FILE.yaml")] = "flat",
+    scenario: Annotated[
+        str, _option("Name or file; default: apartment.", "NAME|FILE.yaml")
+    ] = "apartment",
     robot: Annotated[str | None, _option("Robot.", "NAME")] = None,
     model: Annotated[
         str | None, _option("Both models: rules[:PRESET], random or frontier.", "SPEC")
@@ -50,7 +52,9 @@ def run(
     ] = None,
     seed: Annotated[str | None, _option("Seed of everything random.", "N")] = None,
     max_decisions: Annotated[str | None, _option("Ends the episode.", "N")] = None,
-    renderer: Annotated[str | None, _option("Renderer of the cameras.", "vtk")] = None,
+    renderer: Annotated[
+        str | None, _option("Renderer of the camera; default: raster.", "vtk|raster")
+    ] = None,
     setting: Annotated[
         list[str] | None,
         typer.Option("--set", help="Any value of the scenario.", metavar="DOTTED.KEY=VALUE"),
@@ -84,7 +88,7 @@ def run(
         # A saved scenario's goal and start belong to the task that it was saved with.
         flags["task.goal"], flags["task.start"] = goal or "", start or ""
     loaded = load_scenario(scenario, _overlay(flags, setting or []))
-    check_rendering()
+    check_rendering(renderer=loaded.renderer)
     if out is not None:
         run_watched(loaded, out)
         return

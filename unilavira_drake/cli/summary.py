@@ -35,9 +35,9 @@ def next_commands(result: EpisodeResult, out: Path) -> tuple[str, str, str]:
     again = f"unilavira run --scenario {shlex.quote(str(out / 'scenario.yaml'))}"
     other = "no_tdm" if result.ablation == "full" else "full"
     return (
-        'unilavira run --start bedroom --task "Go to the kitchen and stop at the yellow table."',
+        f"unilavira report {shlex.quote(str(out))}",
         f"{again} --ablation {other}",
-        "unilavira scenarios",
+        'unilavira run --start bedroom --task "Go to the kitchen and stop at the refrigerator."',
     )
 
 

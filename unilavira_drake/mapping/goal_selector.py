@@ -67,7 +67,7 @@ def _selected(
     projection = _projected(vision, frame, max_range)
     if projection.p_WG is None:
         return Goal(n, "none", reason=f"no target: {projection.reason}")
-    return Goal(n, "go", p_WG=projection.p_WG)
+    return Goal(n, "go", p_WG=projection.p_WG, pixel=projection.pixel)
 
 
 def _projected(vision: VisionAction, frame: Frame, max_range: float) -> Projection:

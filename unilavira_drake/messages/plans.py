@@ -25,6 +25,9 @@ class Goal(Message):
     p_WG: tuple[float, float, float] | None = None
     heading: float | None = None
     reason: str = ""
+    pixel: tuple[float, float] | None = None
+    """The representative pixel (u, v) of the selection, behind which ``p_WG`` lies; None for a
+    goal that no view gave."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""RGB-D cameras on a robot: Drake's ``RgbdSensor``, rendered only when pulled."""
+"""RGB-D cameras on a robot, rendered only when pulled: Drake's ``RgbdSensor``, or our own."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pydrake.geometry import (
     ColorRenderCamera,
     DepthRange,
     DepthRenderCamera,
+    FrameId,
     LightParameter,
     MakeRenderEngineVtk,
     RenderCameraCore,
@@ -23,6 +24,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
 from unilavira_drake.messages import Intrinsics
+from unilavira_drake.raster import RasterCameraConfig, RasterView, add_raster_camera, suns_of
 
 RENDERER = "vtk"
 """Name of the render engine in the scene graph."""
@@ -74,11 +76,68 @@ def add_rgbd_camera(
     Returns:
         The sensor, and X_BC, the camera's pose in the body that carries it.
     """
+    body_frame, X_BC = _mount(plant, frame_name)
+    core = _core(intrinsics, min_depth, max_depth)
+    sensor: Any = builder.AddNamedSystem(
+        frame_name,
+        RgbdSensor(
+            body_frame,
+            X_BC,
+            ColorRenderCamera(core, False),
+            DepthRenderCamera(core, DepthRange(min_depth, max_depth)),
+        ),
+    )
+    builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+    return sensor, X_BC
+
+
+def add_raster_rgbd_camera(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    *,
+    frame_name: str,
+    intrinsics: Intrinsics,
+    min_depth: float,
+    max_depth: float,
+    lights: Sequence[LightParameter],
+) -> tuple[Any, RigidTransform]:
+    """Adds the camera of ``add_rgbd_camera`` as a raster camera, which needs no renderer.
+
+    Args:
+        builder: as there, like what is not named here.
+        plant: finalized.
+        scene_graph: what it sees.
+        frame_name: of the camera.
+        intrinsics: of the camera.
+        min_depth: metres.
+        max_depth: metres.
+        lights: directional lights in the world.
+
+    Returns:
+        The camera, and X_BC, its pose in the body that carries it.
+    """
+    body_frame, X_BC = _mount(plant, frame_name)
+    view = RasterView(
+        body_frame,
+        X_BC,
+        _core(intrinsics, min_depth, max_depth),
+        DepthRange(min_depth, max_depth),
+    )
+    config = RasterCameraConfig((view,), light=suns_of(lights), fallback_lights=tuple(lights))
+    return add_raster_camera(builder, scene_graph, config, frame_name), X_BC
+
+
+def _mount(plant: MultibodyPlant, frame_name: str) -> tuple[FrameId, RigidTransform]:
+    """Returns the frame of the body that carries a camera, and the camera's pose in it."""
     frame: Any = plant.GetFrameByName(frame_name)
-    X_BC: RigidTransform = frame.GetFixedPoseInBodyFrame()
+    return plant.GetBodyFrameIdOrThrow(frame.body().index()), frame.GetFixedPoseInBodyFrame()
+
+
+def _core(intrinsics: Intrinsics, min_depth: float, max_depth: float) -> RenderCameraCore:
     # Measured on rendered depth (1.51, 1.58): Drake's renderer takes the principal point in
     # coordinates whose integers are pixel corners, half a pixel from ours.
-    core = RenderCameraCore(
+    return RenderCameraCore(
         RENDERER,
         CameraInfo(
             intrinsics.width,
@@ -91,15 +150,3 @@ def add_rgbd_camera(
         ClippingRange(min(0.05, min_depth), max(40.0, 2.0 * max_depth)),
         RigidTransform(),
     )
-    body_frame = plant.GetBodyFrameIdOrThrow(frame.body().index())
-    sensor: Any = builder.AddNamedSystem(
-        frame_name,
-        RgbdSensor(
-            body_frame,
-            X_BC,
-            ColorRenderCamera(core, False),
-            DepthRenderCamera(core, DepthRange(min_depth, max_depth)),
-        ),
-    )
-    builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
-    return sensor, X_BC
