@@ -1,4 +1,4 @@
-"""The named tasks of ``flat``: what each model makes of them, and on what evidence."""
+"""The named tasks of each scenario: what each model makes of them, and on what evidence."""
 
 from __future__ import annotations
 
@@ -14,8 +14,15 @@ from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.sensors.detections import GroundTruthDetector, permuted_labels
 from unilavira_drake.worlds.load import load_world
 
+SCENARIOS = ("apartment", "flat", "office")
+TASKS = [(scenario, name) for scenario in SCENARIOS for name in load_scenario(scenario).tasks]
 NAMES = sorted(load_scenario("flat").tasks)
-BACKTRACKS = ("nightstand", "washing_machine")
+BACKTRACKS = (
+    ("flat", "nightstand"),
+    ("flat", "washing_machine"),
+    ("apartment", "armchair"),
+    ("apartment", "nightstand"),
+)
 
 
 @dataclass
@@ -34,19 +41,25 @@ class Evidence:
             self.actions[message.n] = message
 
 
-def run(name: str, model: str = "rules", decisions: int = 40, **options: Any) -> EpisodeResult:
+def run(
+    name: str,
+    model: str = "rules",
+    decisions: int = 40,
+    scenario: str = "flat",
+    **options: Any,
+) -> EpisodeResult:
     """Runs a named task to its end."""
     overlay = (
         f"task: {{text: '@{name}'}}\nlanguage_model: {model}\nvision_model: {model}\n"
         f"budgets: {{decisions: {decisions}}}"
     )
-    return run_episode(load_scenario("flat", overlay), **options)
+    return run_episode(load_scenario(scenario, overlay), **options)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_rules_succeeds_and_cites_what_it_saw(name: str) -> None:
+@pytest.mark.parametrize(("scenario", "name"), TASKS)
+def test_rules_succeeds_and_cites_what_it_saw(scenario: str, name: str) -> None:
     evidence = Evidence()
-    result = run(name, on_event=evidence.listen)
+    result = run(name, scenario=scenario, on_event=evidence.listen)
     assert result.cause == "stopped"
     assert result.success
     assert result.metrics.collisions == 0
@@ -61,7 +74,7 @@ def test_rules_succeeds_and_cites_what_it_saw(name: str) -> None:
         cited = re.findall(r"\b(?:front|left|right|back)#\d+", text)
         assert cited, f"call {n} completed an item without evidence: {text!r}"
         assert set(cited) <= evidence.shown[n]
-    if name in BACKTRACKS:
+    if (scenario, name) in BACKTRACKS:
         assert result.counts.backtracks >= 1
         assert any(action.call == "recover" for action in evidence.actions.values())
 
@@ -79,9 +92,18 @@ def test_goals_are_far_away_and_in_another_room() -> None:
         assert start.name != thing.room
 
 
-@pytest.mark.parametrize(("model", "most"), [("random", 1), ("frontier", 3)])
-def test_lower_bounds_stay_low(model: str, most: int) -> None:
-    results = [run(name, model) for name in NAMES]
+@pytest.mark.parametrize(
+    ("scenario", "model", "most"),
+    [
+        ("flat", "random", 1),
+        ("flat", "frontier", 3),
+        ("apartment", "random", 1),
+        ("apartment", "frontier", 4),
+    ],
+)
+def test_lower_bounds_stay_low(scenario: str, model: str, most: int) -> None:
+    names = load_scenario(scenario).tasks
+    results = [run(name, model, scenario=scenario) for name in names]
     assert sum(bool(result.success) for result in results) <= most
 
 
