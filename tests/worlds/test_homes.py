@@ -71,7 +71,7 @@ def test_every_task_is_a_way_of_eight_metres(home: tuple[Scenario, World]) -> No
         start = world.room_at(x, y)
         assert start is not None
         assert all(start.name not in target.rooms for target in goal.targets), name
-        assert len(task.text.split()) <= 135
+        assert len(task.text.split()) <= 130
 
 
 def test_every_room_can_be_reached(home: tuple[Scenario, World]) -> None:
