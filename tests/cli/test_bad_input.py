@@ -14,7 +14,7 @@ from unilavira_drake.rendering_check import check_rendering
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     # A second each, and tests/test_rendering_check.py is about it.
-    monkeypatch.setattr(f"unilavira_drake.cli.run.{check_rendering.__name__}", lambda: None)
+    monkeypatch.setattr(f"unilavira_drake.cli.run.{check_rendering.__name__}", lambda **_: None)
 
 
 @pytest.mark.parametrize(

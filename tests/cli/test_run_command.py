@@ -24,7 +24,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def _no_preflight(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("unilavira_drake.cli.run.check_rendering", lambda: None)
+    monkeypatch.setattr("unilavira_drake.cli.run.check_rendering", lambda **_: None)
 
 
 def test_a_run_tells_its_story_and_leaves_its_folder(capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,7 +75,7 @@ def test_an_interrupt_keeps_what_was_done(
 def test_a_machine_without_a_renderer_is_not_the_user_s_mistake(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def broken() -> None:
+    def broken(**_: str) -> None:
         raise RenderingError("rendering: install libegl1")
 
     monkeypatch.setattr("unilavira_drake.cli.run.check_rendering", broken)
