@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
         lines = _everything(entries) if options.all else _selection(options.selection)
         wanted = [line for line in lines if not options.only or line["name"] in options.only]
         rows = [_convert(line, entries, options) for line in wanted]
-    _write_tables(options.out, [row for row in rows if row is not None], {n["name"] for n in lines})
+    _write_tables(options.out, [row for row in rows if row is not None])
     return 0
 
 
@@ -85,7 +85,6 @@ def _convert(
 ) -> dict[str, Any] | None:
     """Writes one model; returns its rows of the catalogue and of the attribution."""
     folder = options.out / line["name"]
-    shutil.rmtree(folder, ignore_errors=True)
     entry = entries.get((line["library"], line["id"]))
     if entry is None:
         print(f"{line['name']}: not in {line['library']!r}. Left out.", file=sys.stderr)
@@ -97,6 +96,7 @@ def _convert(
         return None
     side = int(line.get("texture", options.texture))
     groups = merge(parts, line.get("colors", {}))
+    shutil.rmtree(folder, ignore_errors=True)
     triangles = write_gltf(folder, line["name"], groups, texture_side=side)
     low, high = extent(parts)
     size, elevation = (high - low).round(3).tolist(), round(float(low[2]), 3)
@@ -157,8 +157,11 @@ def _changes(line: dict[str, Any], before: int, after: int) -> str:
     return ", ".join(notes)
 
 
-def _write_tables(out: Path, rows: list[dict[str, Any]], names: set[str]) -> None:
-    """Merges the rows into the catalogue and the attribution, for the names of the selection."""
+def _write_tables(out: Path, rows: list[dict[str, Any]]) -> None:
+    """Merges the rows into the catalogue and the attribution.
+
+    A model leaves both when its folder is gone; nothing is deleted here.
+    """
     out.mkdir(parents=True, exist_ok=True)
     catalogue_file, attribution_file = out / "catalogue.yaml", out / "ATTRIBUTION.csv"
     catalogue: dict[str, Any] = {}
@@ -169,10 +172,7 @@ def _write_tables(out: Path, rows: list[dict[str, Any]], names: set[str]) -> Non
             attribution = {row["name"]: row for row in csv.DictReader(file)}
     catalogue.update({row["name"]: row["catalogue"] for row in rows})
     attribution.update({row["name"]: row["attribution"] for row in rows})
-    kept = sorted(name for name in catalogue if name in names and (out / name).is_dir())
-    for folder in out.iterdir():
-        if folder.is_dir() and folder.name not in kept:
-            shutil.rmtree(folder)
+    kept = sorted(name for name in catalogue if (out / name).is_dir())
     chosen = {name: catalogue[name] for name in kept}
     text = yaml.safe_dump(chosen, sort_keys=False, default_flow_style=None)
     catalogue_file.write_text(text, encoding="utf-8")

@@ -43,7 +43,9 @@ def choose_task(scenario: Scenario) -> EpisodeTask:
             )
         text = f"@{scenario.default_task}"
     name = _named(scenario, text)
-    task = scenario.tasks[name] if name else NamedTask(text=text)
+    # Words of one's own that end in a question mark ask for an answer.
+    family = "eqa" if text.rstrip().endswith("?") else "vln"
+    task = scenario.tasks[name] if name else NamedTask(family=family, text=text)
     return EpisodeTask(
         spec=checked_task(task.text, task.family),
         name=name,

@@ -33,6 +33,11 @@ def said(text):
             ["Turn right", "Go past the bench", "Go past the lamp",
              "Go through the first door on the right"],
         ),
+        (
+            "Enter the living room. There are two couches: stop in front of the blue one.",
+            ["Enter the living room", "Stop next to the blue sofa"],
+        ),
+        ("Go to the TV monitor in the lounge.", ["Enter the living room", "Go to the television"]),
         ("There is a door on your left. Go through it.", ["Go through the door on the left"]),
         ("Before entering the kitchen, turn left.", ["Turn left", "Enter the kitchen"]),
         ("Get out of here, and wait by the plant.", ["Leave this room", "Stop next to the plant"]),

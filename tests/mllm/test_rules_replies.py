@@ -10,6 +10,7 @@ from unilavira_drake.errors import MllmError
 from unilavira_drake.messages import DIRECTIONS, TodoItem
 from unilavira_drake.mllm.evidence import Detection, ViewEvidence
 from unilavira_drake.mllm.request import (
+    DecisionNote,
     LanguageVariables,
     MllmRequest,
     ViewNote,
@@ -171,6 +172,9 @@ def test_a_dead_end_is_left_by_a_backtrack_to_the_corridor_when_that_is_offered(
     reply = ask("decide", views, [("Go to the sofa",)], waypoints=notes)
     assert reply["action"] == {"tool": "backtrack", "waypoint": 2}
     reply = ask("decide", views, [("Go to the sofa",)], waypoints=notes, second_chance=False)
+    assert reply["action"]["tool"] == "turn"
+    refused = (DecisionNote(3, "at waypoint 1: backtrack 2: failed: unreachable"),)
+    reply = ask("decide", views, [("Go to the sofa",)], waypoints=notes, decisions=refused)
     assert reply["action"]["tool"] == "turn"
 
 

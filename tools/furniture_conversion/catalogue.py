@@ -101,8 +101,20 @@ def _entry(library: str, folder: Path, values: dict[str, str]) -> Entry:
         rotation=np.array(rotation).reshape(3, 3),
         author=author,
         page=page,
-        licence=_LIBRARY_LICENCES.get(library, "CC-BY-3.0"),
+        licence=_licence(library),
     )
+
+
+def _licence(library: str) -> str:
+    """Returns the licence of a library; one that is not known must not be guessed.
+
+    Raises:
+        ValueError: if the library is unknown.
+    """
+    if library not in _LIBRARY_LICENCES:
+        known = ", ".join(sorted(_LIBRARY_LICENCES))
+        raise ValueError(f"{library}: its licence is not known; use {known}, or add it here.")
+    return _LIBRARY_LICENCES[library]
 
 
 def _origin(library: str, folder: Path, values: dict[str, str]) -> tuple[str, str, str]:

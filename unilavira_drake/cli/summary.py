@@ -63,6 +63,8 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
     ]
     if metrics.answer is not None:
         rows.append(("answer", metrics.answer))
+    if metrics.answer_correct is not None:
+        rows.append(("answer correct", _YES_NO[metrics.answer_correct]))
     return rows
 
 

@@ -33,6 +33,9 @@ from unilavira_drake.worlds.world import (
 WALL_GAP = 0.02
 """Between a wall and what stands at it, metres."""
 
+NARROWEST = 0.5
+"""Clear width of a doorway at least, metres."""
+
 WALL_SIDES = ("north", "east", "south", "west")
 
 
@@ -57,6 +60,7 @@ def build_world(entries: WorldFile, place: str) -> World:
     things = _things(entries.objects, by_name, entries.wall_thickness, place)
     panels = tuple(_panel(entry, by_name, entries, place) for entry in entries.panels)
     openings = tuple(_opening(entry, by_name, entries, place) for entry in entries.doors)
+    _check_apart(entries.doors, openings, place)
     doors = tuple(
         WorldObject(
             name=entry.name,
@@ -127,6 +131,12 @@ def _things(
             raise ScenarioError(unknown_name("room", entry.room, rooms, here))
         if entry.color and entry.color not in PALETTE:
             raise ScenarioError(unknown_name("color", entry.color, PALETTE, here))
+        if entry.stands_on and entry.height:
+            raise ScenarioError(f"{here}: height and stands_on are both given; keep one.")
+        if entry.height < 0.0:
+            raise ScenarioError(f"{here}: height: {entry.height} is under the floor.")
+        if entry.wall and not entry.model:
+            raise ScenarioError(f"{here}: wall: needs a model; give a position of two numbers.")
         height = _top(entry.stands_on, things, here) if entry.stands_on else entry.height
         if entry.model:
             thing = _modelled(entry, height, rooms[entry.room], thickness, here)
@@ -236,6 +246,10 @@ def _panel(
     width, height = _numbers(entry.size, 2, f"{place}: size")
     if min(width, height) < 0.05:
         raise ScenarioError(f"{place}: size: {entry.size}; give width and height above 0.05 m.")
+    if not 0.0 <= entry.height <= entries.wall_height - height * (entry.category != "rug"):
+        raise ScenarioError(
+            f"{place}: height: {entry.height} does not fit under {entries.wall_height} m."
+        )
     room = rooms[entry.room]
     visual = panel(entry, room, (x, y), (width, height), entries.wall_thickness)
     thing = WorldObject(
@@ -261,6 +275,8 @@ def _opening(entry: DoorEntry, rooms: dict[str, Room], entries: WorldFile, place
         if name not in rooms:
             raise ScenarioError(unknown_name("room", name, rooms, place))
     x, y = _numbers(entry.position, 2, f"{place}: position")
+    if not entry.width >= NARROWEST:
+        raise ScenarioError(f"{place}: width: {entry.width}; give at least {NARROWEST} m.")
     joined = (rooms[entry.rooms[0]], rooms[entry.rooms[1]])
     opening = doorway(Doorway(x, y, entry.width, open=entry.open), joined, entries.wall_thickness)
     if opening is None:
@@ -269,6 +285,17 @@ def _opening(entry: DoorEntry, rooms: dict[str, Room], entries: WorldFile, place
             f"shared by {' and '.join(entry.rooms)}; put it on their common edge."
         )
     return opening
+
+
+def _check_apart(doors: list[DoorEntry], openings: tuple[Doorway, ...], place: str) -> None:
+    for i, a in enumerate(openings):
+        for k, b in enumerate(openings[:i]):
+            along, across = (b.x - a.x, b.y - a.y) if a.along_x else (b.y - a.y, b.x - a.x)
+            same = a.along_x == b.along_x and abs(across) < 1e-6
+            if same and abs(along) < a.gap + b.gap:
+                raise ScenarioError(
+                    f"{place}: doors: {doors[k].name!r} and {doors[i].name!r} overlap; move one."
+                )
 
 
 def _unique(

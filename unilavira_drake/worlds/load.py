@@ -77,6 +77,8 @@ def _check(data: Any, schema: type, place: str) -> None:
             f"{place}: expected a mapping with the keys {', '.join(fields)}, got {data!r}."
         )
     for key, value in data.items():
+        if key is True:
+            raise ScenarioError(f"{place}: 'on' means true in YAML; write stands_on.")
         if key not in fields:
             raise ScenarioError(unknown_name("key", str(key), fields, place))
         if key not in _LISTS:

@@ -118,6 +118,8 @@ def _way_back(situation: Situation, aim: Aim, ranked: list[Option]) -> Place | N
     offers = [p for p in situation.places if p.offered and p.id != variables.current_waypoint]
     costs = []
     for place in offers:
+        if _was_refused(place, situation):
+            continue
         before = sum(f"backtrack {place.id}:" in note.text for note in variables.decisions)
         cost = _RETURN + 0.3 * place.distance + 3.0 * before
         if goal is not None and goal.category and remembers(place, goal) and not place.tried:
@@ -128,6 +130,15 @@ def _way_back(situation: Situation, aim: Aim, ranked: list[Option]) -> Place | N
     if not costs or min(costs)[0] >= best:
         return None
     return min(costs)[2]
+
+
+def _was_refused(place: Place, situation: Situation) -> bool:
+    """Whether driving back to a place has failed from where the robot stands."""
+    here = f"at waypoint {situation.variables.current_waypoint}:"
+    return any(
+        note.text.startswith(here) and f"backtrack {place.id}: failed" in note.text
+        for note in situation.variables.decisions
+    )
 
 
 def _leads_on(place: Place, situation: Situation) -> bool:
