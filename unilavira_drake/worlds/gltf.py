@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,9 +77,9 @@ def textured_mesh(name: str, parts: list[TexturedQuads]) -> Mesh:
 
 
 def _powers_of_two(image: NDArray[np.uint8]) -> NDArray[Any]:
-    """Returns the picture at the next larger sizes that VTK does not distort."""
-    rows, columns = (1 << (side - 1).bit_length() for side in image.shape[:2])
-    return np.asarray(cv2.resize(image, (columns, rows), interpolation=cv2.INTER_LINEAR))
+    """Returns the picture at the nearest sizes that VTK does not distort."""
+    rows, columns = (1 << round(math.log2(side)) for side in image.shape[:2])
+    return np.asarray(cv2.resize(image, (columns, rows), interpolation=cv2.INTER_AREA))
 
 
 def _add_part(document: dict[str, Any], blob: bytearray, part: TexturedQuads, index: int) -> None:
