@@ -14,8 +14,6 @@ and 3.1 ms for a plain one, at 640x480 on two cores without a GPU.
 from __future__ import annotations
 
 import argparse
-import ctypes
-import gc
 import importlib
 import json
 import math
@@ -25,34 +23,27 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from cost import cpu_and_memory, cpu_ms, resident_mb
 from pydrake.geometry import (
-    Box,
-    Capsule,
     ClippingRange,
     ColorRenderCamera,
-    Cylinder,
     DepthRange,
     DepthRenderCamera,
-    Ellipsoid,
-    GeometryInstance,
     MakeRenderEngineVtk,
-    PerceptionProperties,
     RenderCameraCore,
     RenderEngineVtkParams,
-    RenderLabel,
-    Rgba,
-    Sphere,
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
+from scenes import ROOM, add_shapes
 
 from unilavira_drake.raster import RasterCameraConfig, RasterView, add_raster_camera, suns_of
 from unilavira_drake.worlds.load import load_world
@@ -60,31 +51,6 @@ from unilavira_drake.worlds.scenery import add_scenery, lights
 
 IMAGES = ("color_image", "depth_image_32f", "label_image")
 DEPTH = IMAGES[1:2]
-
-ROOM = """
-name: room
-wall_height: 2.6
-wall_thickness: 0.1
-rooms:
-- {name: hall, kind: hall, rectangle: [0, 0, 5, 4], floor: oak, walls: cream_paint}
-- {name: kitchen, kind: kitchen, rectangle: [5, 0, 9, 4], floor: white_tile, walls: white_tiles}
-doors:
-- {name: door, rooms: [hall, kitchen], position: [5.0, 2.0], width: 1.0, color: white}
-objects:
-- {name: sofa_1, category: sofa, color: red, room: hall, position: [1.6, 0.6], yaw_degrees: 90}
-"""
-
-
-class Mallinfo2(ctypes.Structure):
-    """What the C library counts."""
-
-    _fields_ = tuple(
-        (name, ctypes.c_size_t)
-        for name in (
-            *("arena", "ordblks", "smblks", "hblks", "hblkhd"),
-            *("usmblks", "fsmblks", "uordblks", "fordblks", "keepcost"),
-        )
-    )
 
 
 class Bench:
@@ -207,42 +173,6 @@ class Bench:
             depths.append(float(near.mean()))
             labels.append(float((label == other).mean()))
         return statistics.mean(depths), statistics.mean(labels), min(depths)
-
-
-def add_shapes(plant: Any, graph: Any) -> None:
-    """Adds a ring of primitive shapes."""
-    shapes = (
-        Box(0.5, 0.7, 0.9),
-        Sphere(0.4),
-        Cylinder(0.3, 0.8),
-        Capsule(0.25, 0.6),
-        Ellipsoid(0.2, 0.3, 0.5),
-    )
-    for index in range(20):
-        angle = 0.1 * math.pi * index
-        X = RigidTransform(
-            RollPitchYaw(0.3, 0.5, index), [3.0 * math.cos(angle), 3.0 * math.sin(angle), 1.0]
-        )
-        one = GeometryInstance(X, shapes[index % 5], f"shape_{index}")
-        properties = PerceptionProperties()
-        properties.AddProperty("label", "id", RenderLabel(index + 1))
-        properties.AddProperty("phong", "diffuse", Rgba(0.3, 0.6, 0.9, 1.0))
-        one.set_perception_properties(properties)
-        graph.RegisterAnchoredGeometry(plant.get_source_id(), one)
-
-
-def cpu_ms(function: Callable[[], Any]) -> float:
-    """Returns the CPU time of a call, all threads, milliseconds."""
-    start = time.process_time()
-    function()
-    return 1e3 * (time.process_time() - start)
-
-
-def resident_mb() -> float:
-    """Returns the resident memory of this process."""
-    gc.collect()
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
 def row(id_: str, what: str, value: float, unit: str, **more: Any) -> None:
@@ -387,22 +317,6 @@ def clones(world: str) -> None:
             sense="<=",
         )
         bench.pull("raster")
-
-
-def cpu_and_memory(function: Callable[[], Any]) -> tuple[float, float]:
-    """Returns the CPU milliseconds of a call and the megabytes that its result holds."""
-    gc.collect()
-    before, kept = allocated_mb(), []
-    spent = cpu_ms(lambda: kept.append(function()))
-    return spent, allocated_mb() - before
-
-
-def allocated_mb() -> float:
-    """Returns what this process has allocated and not freed, by the C library's count."""
-    counters = ctypes.CDLL(None).mallinfo2
-    counters.restype = Mallinfo2
-    found = counters()
-    return float(found.uordblks + found.hblkhd) / 2**20
 
 
 def leaks(world: str) -> None:

@@ -17,10 +17,7 @@ _ARRAY_BUFFER, _ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 
 def write_gltf(folder: Path, name: str, groups: list[Group], *, texture_side: int) -> int:
-    """Writes ``name.gltf``, ``name.bin`` and its pictures; returns the number of triangles.
-
-    The first group's material is marked as the main one.
-    """
+    """Writes ``name.gltf``, ``name.bin`` and its pictures; returns the number of triangles."""
     folder.mkdir(parents=True, exist_ok=True)
     document: dict[str, Any] = {
         "asset": {"version": "2.0"},
@@ -38,7 +35,6 @@ def write_gltf(folder: Path, name: str, groups: list[Group], *, texture_side: in
         mesh = index(group.part)
         triangles += len(mesh.triangles)
         material = _material(document, folder, name, group, texture_side)
-        material["extras"] = {"main": number == 0}
         document["materials"].append(material)
         textured = group.material.texture is not None
         primitive = _primitive(document, blob, mesh, textured)
