@@ -8,7 +8,8 @@ import dataclasses
 
 from unilavira_drake import load_scenario, run_episode
 from unilavira_drake.messages import LanguageAction, Panorama, TodoList, VisionAction
-from unilavira_drake.mllm.request import MllmReply, MllmRequest
+from unilavira_drake.mllm.reply import MllmReply
+from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.ports import Level, message_input
 from unilavira_drake.tasks import TaskSpec
 

@@ -11,7 +11,8 @@ from pydrake.systems.analysis import Simulator
 from unilavira_drake.errors import MllmError
 from unilavira_drake.mllm.broker import Broker
 from unilavira_drake.mllm.latency import ConstantLatency, LognormalLatency, NoLatency
-from unilavira_drake.mllm.request import Completion, MllmReply, MllmRequest, Usage
+from unilavira_drake.mllm.reply import Completion, MllmReply, Usage
+from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.model_link import Latency, ModelLink
 

@@ -15,7 +15,7 @@ from unilavira_drake.memory.waypoint_system import WaypointMemory
 from unilavira_drake.messages import Frame
 from unilavira_drake.mllm.broker import Broker
 from unilavira_drake.mllm.evidence import ViewEvidence
-from unilavira_drake.mllm.request import Mllm
+from unilavira_drake.mllm.reply import Mllm
 from unilavira_drake.model_link import Latency, ModelLink
 from unilavira_drake.vision.system import Vision
 from unilavira_drake.wiring import Wiring

@@ -10,8 +10,16 @@ The tree::
     ├── InfrastructureError   the machine or a service is not able (exit code 3)
     │   ├── RenderingError    no usable renderer
     │   └── MllmError         the model could not be reached or answered with an error
-    │       └── MllmTimeout   no reply before the deadline
+    │       ├── MllmTimeout               no reply before the deadline
+    │       ├── MllmUnreachable           no connection, or no usable answer from the server
+    │       ├── MllmAuthenticationError   the key is missing or refused
+    │       ├── MllmQuotaError            the quota is used up, or the next try is too far off
+    │       ├── MllmRequestError          the server refuses this request
+    │       │   └── ContextLengthError    the prompt is longer than the model takes
+    │       └── CassetteError             the cassette holds no reply to this request
     ├── ReplyFormatError      a model's reply is not what was asked for (handled by a re-ask)
+    │   ├── ReplyTruncated    it was cut off at the limit of tokens
+    │   └── ReplyRefused      the model or its provider refused to answer (never asked again)
     └── PortTypeError         a port carries another type than its reader expects (a wiring bug)
 
 Inside the control loop expected failures are values (a status on a port); only bugs raise.
@@ -21,6 +29,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 
 class UniLaviraError(Exception):
@@ -54,13 +63,51 @@ class RenderingError(InfrastructureError):
 class MllmError(InfrastructureError):
     """A model could not be reached, or answered with an error instead of a reply."""
 
+    attempts: tuple[Any, ...] = ()
+    """The ``mllm.reply.Attempt`` of each request on the wire before the error."""
+
 
 class MllmTimeout(MllmError):
     """A model gave no reply before its deadline."""
 
 
+class MllmUnreachable(MllmError):
+    """No connection, or no usable answer: DNS, TLS, a reset, 5xx, a body that is no JSON."""
+
+
+class MllmAuthenticationError(MllmError):
+    """The key is missing or refused."""
+
+
+class MllmQuotaError(MllmError):
+    """The quota is used up, or the provider allows the next try too late."""
+
+
+class MllmRequestError(MllmError):
+    """The server refuses this very request, so trying again would not help."""
+
+
+class ContextLengthError(MllmRequestError):
+    """The prompt is longer than the model takes."""
+
+
+class CassetteError(MllmError):
+    """A cassette holds no reply to this request; the message says what differs."""
+
+
 class ReplyFormatError(UniLaviraError):
     """A model's reply does not have the form that was asked for."""
+
+    attempts: tuple[Any, ...] = ()
+    """The ``mllm.reply.Attempt`` of each request on the wire, when a backend raises it."""
+
+
+class ReplyTruncated(ReplyFormatError):
+    """A reply was cut off at the limit of tokens."""
+
+
+class ReplyRefused(ReplyFormatError):
+    """The model, or its provider's filter, refused to answer."""
 
 
 class PortTypeError(UniLaviraError, TypeError):

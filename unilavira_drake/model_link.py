@@ -11,7 +11,8 @@ from pydrake.systems.framework import Context
 from unilavira_drake.errors import MllmError
 from unilavira_drake.messages import Message
 from unilavira_drake.mllm.broker import Broker
-from unilavira_drake.mllm.request import Completion, MllmReply, MllmRequest
+from unilavira_drake.mllm.reply import Completion, MllmReply
+from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.ports import Level, message_input
 

@@ -64,6 +64,12 @@ class Budgets:
     simulated_time: float = 1800.0
     # Simulated seconds without any progress of the ring.
     stall: float = 600.0
+    # Of both models together, null: no limit. Calls, tokens in and out, seconds that the models
+    # took (wall-clock, or as recorded), US dollars.
+    model_calls: int | None = None
+    model_tokens: int | None = None
+    model_seconds: float | None = None
+    model_cost_usd: float | None = None
 
 
 @dc.dataclass
@@ -81,9 +87,17 @@ class Scenario:
     tasks: dict[str, NamedTask] = dc.field(default_factory=dict)
     default_task: str = ""
     task: TaskChoice = dc.field(default_factory=TaskChoice)
-    # SPEC of the models: rules[:PRESET] | random | frontier.
+    # SPEC of the models: rules[:PRESET] | random | frontier | cassette:FILE | mailbox:DIR |
+    # PROFILE | PROFILE.yaml | openai:MODEL@BASE_URL.
     language_model: str = "rules"
     vision_model: str = "rules"
+    # A cassette that keeps every reply of this episode; empty: none.
+    record: str = ""
+    # record: a new file. record_new: replies that the file holds are replayed, others are asked
+    # for and added.
+    record_mode: str = "record"
+    # compact: history in small pictures. paper: every picture in full.
+    prompt_preset: str = "compact"
     language_latency: NoLatency | ConstantLatency | LognormalLatency = dc.field(
         default_factory=NoLatency
     )

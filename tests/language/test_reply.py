@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 
 from unilavira_drake.errors import ReplyFormatError
-from unilavira_drake.language.reply import parse_language_reply, reply_schema
+from unilavira_drake.language.reply import parse_language_reply
 from unilavira_drake.messages import CALLS, DIRECTIONS, LanguageAction, TodoItem, TodoUpdate
+from unilavira_drake.mllm.reply_forms import reply_schema
 from unilavira_drake.mllm.request import (
     LanguageVariables,
     MllmRequest,

@@ -10,7 +10,8 @@ import pytest
 
 from unilavira_drake.errors import MllmError, MllmTimeout
 from unilavira_drake.mllm.broker import Broker
-from unilavira_drake.mllm.request import Completion, MllmRequest
+from unilavira_drake.mllm.reply import Completion
+from unilavira_drake.mllm.request import MllmRequest
 
 
 class Backend:

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from unilavira_drake.errors import InputError
-from unilavira_drake.mllm.request import Usage
+from unilavira_drake.mllm.reply import Usage
 from unilavira_drake.recording.result import (
     EpisodeResult,
     MetricsResult,
@@ -48,7 +48,9 @@ def test_the_file_holds_the_public_names() -> None:
     assert set(data["counts"]) == words(
         "decisions language_calls vision_calls reasks fallbacks backtracks"
     )
-    assert set(data["usage"]) == {"input_tokens", "output_tokens", "images", "cost_usd"}
+    assert set(data["usage"]) == words(
+        "input_tokens output_tokens images cost_usd cached_tokens reasoning_tokens"
+    )
     assert data["time"] == {"simulated_s": 0.0}
     assert data["success"] is None
 

@@ -24,12 +24,8 @@ from unilavira_drake.messages import (
     VisionAction,
 )
 from unilavira_drake.messages.metrics import EpisodeMetrics
-from unilavira_drake.mllm.request import (
-    LanguageVariables,
-    MllmReply,
-    MllmRequest,
-    VisionVariables,
-)
+from unilavira_drake.mllm.reply import MllmReply
+from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, VisionVariables
 from unilavira_drake.recording.result import EpisodeResult, ModelResult, TaskResult
 from unilavira_drake.recording.run_folder import RunFolder
 from unilavira_drake.scenario_loading import dump_scenario, load_scenario

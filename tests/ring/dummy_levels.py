@@ -28,7 +28,8 @@ from unilavira_drake.messages import (
 )
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.latency import ConstantLatency
-from unilavira_drake.mllm.request import Completion, MllmRequest
+from unilavira_drake.mllm.reply import Completion
+from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.ports import Level, message_input
 from unilavira_drake.sensors.observer import Observer
 from unilavira_drake.tasks import TaskSpec

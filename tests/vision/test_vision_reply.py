@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from unilavira_drake.errors import ReplyFormatError
 from unilavira_drake.messages import VisionAction
+from unilavira_drake.mllm.reply_forms import reply_schema
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, VisionVariables
-from unilavira_drake.vision.reply import parse_vision_reply, reply_schema
+from unilavira_drake.vision.reply import parse_vision_reply
 
 REQUEST = MllmRequest(
     role="vision",
@@ -114,6 +115,6 @@ def test_an_accepted_box_lies_in_the_image(box: list[float]) -> None:
 
 
 def test_schema() -> None:
-    schema = reply_schema()
+    schema = reply_schema("ground")
     assert list(schema["properties"]) == schema["required"] == list(REPLY)
     assert schema["additionalProperties"] is False

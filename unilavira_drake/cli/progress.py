@@ -20,7 +20,8 @@ from unilavira_drake.messages import (
     VisionAction,
 )
 from unilavira_drake.messages.metrics import EpisodeMetrics
-from unilavira_drake.mllm.request import Mllm, MllmRequest
+from unilavira_drake.mllm.reply import Mllm
+from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.task_choice import EpisodeTask
 
 _INDENT = " " * 5

@@ -1,19 +1,24 @@
-"""What the language model may reply, and its translation into a language action.
-
-The five calls (paper III-B1, III-C, III-D) have one reply model each.  Reasoning stands before
-what it decides, since a model writes in this order (paper III-C: separate ``reasoning_todo`` and
-``reasoning_action`` fields).
-"""
+"""What a reply of the language model means (paper III-B1, III-C, III-D)."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
-
-import pydantic
-
 from unilavira_drake.errors import ReplyFormatError
 from unilavira_drake.messages import DIRECTIONS, LanguageAction, TodoUpdate
-from unilavira_drake.mllm.reply_model import ReplyModel, bounded, clipped
+from unilavira_drake.mllm.reply_forms import (
+    REPLY_MODELS,
+    ActionReply,
+    AddOp,
+    AnswerReply,
+    Backtrack,
+    GoStair,
+    PlanReply,
+    RemoveOp,
+    RewriteOp,
+    Turn,
+    UpdateOp,
+    VerdictReply,
+)
+from unilavira_drake.mllm.reply_model import bounded, clipped
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 
 MAX_PLAN_ITEMS = 32
@@ -23,123 +28,6 @@ CONTENT_LIMIT = 200
 RESULT_LIMIT = 300
 REASON_LIMIT = 400
 ANSWER_LIMIT = 200
-
-
-class UpdateOp(ReplyModel):
-    """Closes an item with its evidence, or opens it again."""
-
-    op: Literal["update"]
-    index: int
-    status: Literal["completed", "pending"]
-    # May be missing: the TODO memory then rolls the completion back and says so.
-    result: str = ""
-
-
-class RewriteOp(ReplyModel):
-    """Words a pending item better."""
-
-    op: Literal["rewrite"]
-    index: int
-    content: str
-
-
-class AddOp(ReplyModel):
-    """Adds an item at a position, or at the end."""
-
-    op: Literal["add"]
-    content: str
-    index: int | None = None
-
-
-class RemoveOp(ReplyModel):
-    """Drops an item."""
-
-    op: Literal["remove"]
-    index: int
-
-
-class Turn(ReplyModel):
-    """Go towards something in one of the four views."""
-
-    tool: Literal["turn"]
-    direction: Literal["front", "left", "right", "back"]
-
-
-class Backtrack(ReplyModel):
-    """Drive back to a waypoint (paper III-D)."""
-
-    tool: Literal["backtrack"]
-    waypoint: int
-
-
-class GoStair(ReplyModel):
-    """Take the stairs."""
-
-    tool: Literal["go_stair"]
-    stair: Literal["up", "down"]
-
-
-class DoubleCheck(ReplyModel):
-    """Propose to stop here."""
-
-    tool: Literal["double_check"]
-
-
-TodoOp = Annotated[
-    UpdateOp | RewriteOp | AddOp | RemoveOp,
-    pydantic.Field(discriminator="op"),
-]
-Tool = Annotated[
-    Turn | Backtrack | GoStair | DoubleCheck,
-    pydantic.Field(discriminator="tool"),
-]
-
-
-class PlanReply(ReplyModel):
-    """Reply to ``plan_todo``."""
-
-    reasoning: str
-    todo: list[str]
-
-
-class ActionReply(ReplyModel):
-    """Reply to ``decide`` and ``recover``; the TODO fields may be left out without a list."""
-
-    progress_analysis: str
-    reasoning_todo: str = ""
-    todo_updates: list[TodoOp] = pydantic.Field(default_factory=list)
-    reasoning_action: str
-    action: Tool
-    scene: str
-
-
-class VerdictReply(ReplyModel):
-    """Reply to ``double_check``."""
-
-    reasoning: str
-    confirmed: bool
-    reason: str
-
-
-class AnswerReply(ReplyModel):
-    """Reply to ``answer``."""
-
-    reasoning: str
-    answer: str
-
-
-_MODELS: dict[str, type[ReplyModel]] = {
-    "plan_todo": PlanReply,
-    "decide": ActionReply,
-    "recover": ActionReply,
-    "double_check": VerdictReply,
-    "answer": AnswerReply,
-}
-
-
-def reply_schema(call: str) -> dict[str, Any]:
-    """Returns the JSON schema of the reply to a call, for backends with structured output."""
-    return _MODELS[call].model_json_schema()
 
 
 def parse_language_reply(text: str, request: MllmRequest) -> LanguageAction:
@@ -156,7 +44,7 @@ def parse_language_reply(text: str, request: MllmRequest) -> LanguageAction:
     variables = request.variables
     if not isinstance(variables, LanguageVariables):
         raise TypeError(f"request {request.n} of role {request.role!r} has no language variables")
-    reply = _MODELS[request.call].read(text)
+    reply = REPLY_MODELS[request.call].read(text)
     if isinstance(reply, PlanReply):
         return _plan(reply, request)
     if isinstance(reply, VerdictReply):

@@ -23,7 +23,8 @@ from unilavira_drake.messages import (
     TodoUpdate,
 )
 from unilavira_drake.mllm.evidence import ViewEvidence
-from unilavira_drake.mllm.request import LanguageVariables, MllmReply, MllmRequest
+from unilavira_drake.mllm.reply import MllmReply
+from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 from unilavira_drake.ports import Level, message_input
 from unilavira_drake.tasks import TaskSpec
 

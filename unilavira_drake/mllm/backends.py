@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from unilavira_drake.errors import ScenarioError, unknown_name
 from unilavira_drake.mllm.baselines import FrontierModel, RandomModel
-from unilavira_drake.mllm.request import Mllm
+from unilavira_drake.mllm.reply import Mllm
 from unilavira_drake.mllm.rules import RulesModel
 
 _BACKENDS: dict[str, Callable[[], Mllm]] = {

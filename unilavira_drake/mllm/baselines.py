@@ -13,12 +13,8 @@ from typing import Any
 
 from unilavira_drake.errors import MllmError
 from unilavira_drake.messages import DIRECTIONS, VIEW_YAW
-from unilavira_drake.mllm.request import (
-    Completion,
-    LanguageVariables,
-    MllmRequest,
-    VisionVariables,
-)
+from unilavira_drake.mllm.reply import Completion
+from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, VisionVariables
 
 STOP_CHANCE = 0.1
 """Chance that ``random`` asks to stop, at each decision."""
@@ -35,6 +31,8 @@ class RandomModel:
     name = "random"
     perception = "images"
     reasoning = "rules"
+    box_space = "pixels"
+    deadline = 60.0
     description = "random choices: a lower bound, not a model"
 
     def complete(self, request: MllmRequest) -> Completion:
@@ -57,6 +55,9 @@ class RandomModel:
             return _completion(_action(action, "a random direction"))
         return _completion(_fixed_reply(request.call, self.name))
 
+    def close(self) -> None:
+        """Does nothing: there are no connections."""
+
 
 class FrontierModel:
     """Goes where there is free floor and no visited place; stops after a fixed count."""
@@ -64,6 +65,8 @@ class FrontierModel:
     name = "frontier"
     perception = "images"
     reasoning = "rules"
+    box_space = "pixels"
+    deadline = 60.0
     description = "goes to unvisited free floor and never reads the task: a lower bound"
 
     def complete(self, request: MllmRequest) -> Completion:
@@ -76,13 +79,16 @@ class FrontierModel:
         if isinstance(variables, VisionVariables):
             u, v = variables.width / 2.0, _FLOOR_ROW * variables.height
             return _completion(_point(u, v, "floor ahead"))
-        if request.call in ("decide", "recover"):
+        if isinstance(variables, LanguageVariables) and request.call in ("decide", "recover"):
             if request.n > FRONTIER_DECISIONS:
                 return _completion(_action({"tool": "double_check"}, "enough was seen"))
             direction = _frontier(variables, _generator(request))
             action = {"tool": "turn", "direction": direction}
             return _completion(_action(action, "free floor not visited yet"))
         return _completion(_fixed_reply(request.call, self.name))
+
+    def close(self) -> None:
+        """Does nothing: there are no connections."""
 
 
 def _frontier(variables: LanguageVariables, generator: random.Random) -> str:

@@ -15,7 +15,8 @@ from concurrent.futures import Future, InvalidStateError
 from concurrent.futures import TimeoutError as FutureTimeoutError
 
 from unilavira_drake.errors import MllmError, MllmTimeout
-from unilavira_drake.mllm.request import Completion, Mllm, MllmRequest
+from unilavira_drake.mllm.reply import Completion, Mllm
+from unilavira_drake.mllm.request import MllmRequest
 
 _WAITING_SLICE = 0.2
 """Wall-clock seconds after which an interrupt is noticed at the latest."""

@@ -12,11 +12,46 @@ import functools
 import json
 import math
 import re
+from dataclasses import dataclass
 
 import jinja2
 
-from unilavira_drake.mllm.request import MllmRequest
+from unilavira_drake.messages import Message
+from unilavira_drake.mllm.request import FreeVariables, ImagePart, MllmRequest
 from unilavira_drake.resources import prompts_path
+
+
+@dataclass(frozen=True)
+class Prompt(Message):
+    """What a model reads, in its order: texts and labelled pictures."""
+
+    system: str = ""
+    """The rules; the same at every call of an episode, so providers can cache them."""
+    parts: tuple[str | ImagePart, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """All of it as one text, each picture as a line with its number and label."""
+        lines, number = [self.system], 0
+        for part in self.parts:
+            if isinstance(part, ImagePart):
+                number += 1
+                lines.append(f"[picture {number}: {part.label}]\n")
+            else:
+                lines.append(part)
+        return "".join(lines)
+
+    @property
+    def images(self) -> tuple[ImagePart, ...]:
+        """The pictures in their order."""
+        return tuple(part for part in self.parts if isinstance(part, ImagePart))
+
+
+def compose_prompt(request: MllmRequest) -> Prompt:
+    """Returns the prompt of a request as the texts and pictures that go to a model."""
+    if isinstance(request.variables, FreeVariables):
+        return Prompt(parts=(*request.images, request.variables.text))
+    return Prompt(parts=(*request.images, render_prompt(request)))
 
 
 def render_prompt(request: MllmRequest) -> str:

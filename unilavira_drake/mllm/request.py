@@ -1,4 +1,4 @@
-"""One question to a model, and its answer.
+"""One question to a model.
 
 A request carries *typed prompt variables*: the templates in ``prompts/`` turn them into text for
 a real model, and the offline backends read the same variables.  Bearings are degrees to the left
@@ -12,7 +12,7 @@ import functools
 import hashlib
 import json
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from unilavira_drake.messages import Message, TodoItem
 from unilavira_drake.mllm.evidence import ViewEvidence
@@ -92,6 +92,15 @@ class VisionVariables(Message):
     todo: tuple[TodoItem, ...] | None = None
     width: int = 640
     height: int = 480
+    box_space: str = "pixels"
+    """How this model writes places in a picture, a key of ``boxes.BOX_SPACES``."""
+
+
+@dataclass(frozen=True)
+class FreeVariables(Message):
+    """A text that is sent to the model word for word, outside of any episode."""
+
+    text: str = ""
 
 
 @dataclass(frozen=True)
@@ -100,6 +109,9 @@ class ImagePart(Message):
 
     label: str = ""
     jpeg: bytes = b""
+    detail: str = "high"
+    """How finely the model should look at it: ``low`` | ``medium`` | ``high``; each provider has
+    its own price for each."""
 
 
 @dataclass(frozen=True)
@@ -112,8 +124,8 @@ class MllmRequest(Message):
     attempt: int = 0
     seed: int = 0
     call: str = ""
-    """One of ``messages.CALLS`` for language, ``ground`` for vision."""
-    variables: LanguageVariables | VisionVariables = LanguageVariables()
+    """One of ``messages.CALLS`` for language, ``ground`` for vision; ``free`` for a free text."""
+    variables: LanguageVariables | VisionVariables | FreeVariables = LanguageVariables()
     images: tuple[ImagePart, ...] = ()
     evidence: tuple[ViewEvidence, ...] | None = None
     """Only for a model that declares ``perception: ground_truth``."""
@@ -124,73 +136,6 @@ class MllmRequest(Message):
     def digest(self) -> str:
         """SHA-256 of the content; images count by their own hash."""
         return hashlib.sha256(json.dumps(_plain(self), sort_keys=True).encode()).hexdigest()
-
-
-@dataclass(frozen=True)
-class Usage(Message):
-    """What a reply cost; zero for models that count no tokens."""
-
-    input_tokens: int = 0
-    output_tokens: int = 0
-    images: int = 0
-    cost_usd: float | None = None
-
-    def __add__(self, other: Usage) -> Usage:
-        known = self.cost_usd is not None and other.cost_usd is not None
-        return Usage(
-            self.input_tokens + other.input_tokens,
-            self.output_tokens + other.output_tokens,
-            self.images + other.images,
-            (self.cost_usd or 0.0) + (other.cost_usd or 0.0) if known else None,
-        )
-
-
-@dataclass(frozen=True)
-class Completion(Message):
-    """What a backend returns: the raw text and its cost."""
-
-    text: str = ""
-    usage: Usage = Usage()
-
-
-@dataclass(frozen=True)
-class MllmReply(Message):
-    """A reply as it becomes visible on a port, or the named error that took its place."""
-
-    n: int = 0
-    attempt: int = 0
-    text: str = ""
-    error: str = ""
-    usage: Usage = Usage()
-    latency: float = 0.0
-    """Simulated seconds from request to reply."""
-
-
-class Mllm(Protocol):
-    """A model backend: a deterministic function of one request, safe to call from a thread."""
-
-    @property
-    def name(self) -> str:
-        """Name for results and the first line of a run."""
-
-    @property
-    def perception(self) -> str:
-        """``ground_truth`` (gets the simulator's labels as evidence) or ``images``."""
-
-    @property
-    def reasoning(self) -> str:
-        """``rules`` | ``model`` | ``human``."""
-
-    @property
-    def description(self) -> str:
-        """One honest sentence about what this model is."""
-
-    def complete(self, request: MllmRequest) -> Completion:
-        """Answers a request.
-
-        Raises:
-            MllmError: if no reply can be had.
-        """
 
 
 def _plain(value: Any) -> Any:

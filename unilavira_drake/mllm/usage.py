@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from unilavira_drake.messages import Message
-from unilavira_drake.mllm.request import Usage
+from unilavira_drake.mllm.reply import Usage
 
 
 @dataclass(frozen=True)

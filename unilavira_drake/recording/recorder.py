@@ -14,7 +14,8 @@ from unilavira_drake.messages import (
     VisionAction,
 )
 from unilavira_drake.messages.metrics import EpisodeMetrics
-from unilavira_drake.mllm.request import MllmReply, MllmRequest
+from unilavira_drake.mllm.reply import MllmReply
+from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.ports import message_input
 from unilavira_drake.recording.message_log import Listener
 

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from unilavira_drake.errors import InputError
-from unilavira_drake.mllm.request import Usage
+from unilavira_drake.mllm.reply import Usage
 
 RESULT_SCHEMA_VERSION = 1
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from unilavira_drake.messages import LanguageAction, VisionAction
-from unilavira_drake.mllm.request import MllmReply, MllmRequest, Usage
+from unilavira_drake.mllm.reply import MllmReply, Usage
+from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.recording.result import CountsResult
 
 

@@ -18,7 +18,8 @@ from unilavira_drake.messages import (
     VisionAction,
 )
 from unilavira_drake.messages.metrics import EpisodeMetrics
-from unilavira_drake.mllm.request import LanguageVariables, MllmReply, MllmRequest
+from unilavira_drake.mllm.reply import MllmReply
+from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 from unilavira_drake.recording.result import CountsResult, EpisodeResult, result_from_json
 from unilavira_drake.recording.tally import Tally
 from unilavira_drake.recording.trace import EpisodeTrace

@@ -1,35 +1,17 @@
-"""What the vision model may reply, and its translation into a vision action (paper III-B2)."""
+"""What a reply of the vision model means: its translation into a vision action (paper III-B2)."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-import pydantic
-
 from unilavira_drake.errors import ReplyFormatError
 from unilavira_drake.messages import VisionAction
-from unilavira_drake.mllm.reply_model import ReplyModel, bounded, clipped
+from unilavira_drake.mllm.reply_forms import GroundReply
+from unilavira_drake.mllm.reply_model import bounded, clipped
 from unilavira_drake.mllm.request import MllmRequest, VisionVariables
 
 MIN_BOX_AREA = 16.0
 """Square pixels."""
 TARGET_LIMIT = 120
 REASON_LIMIT = 400
-
-
-class GroundReply(ReplyModel):
-    """Reply to ``ground``: a box, or a point when a box is ill-defined, or neither and why."""
-
-    target_desc: str
-    box: Annotated[list[float], pydantic.Field(min_length=4, max_length=4)] | None
-    point: Annotated[list[float], pydantic.Field(min_length=2, max_length=2)] | None
-    confidence: Annotated[float, pydantic.Field(ge=0.0, le=1.0)] | None
-    reason: str
-
-
-def reply_schema() -> dict[str, Any]:
-    """Returns the JSON schema of the reply, for backends with structured output."""
-    return GroundReply.model_json_schema()
 
 
 def parse_vision_reply(text: str, request: MllmRequest) -> VisionAction:

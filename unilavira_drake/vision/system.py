@@ -18,7 +18,8 @@ from unilavira_drake.messages import (
     VisionAction,
 )
 from unilavira_drake.mllm.evidence import ViewEvidence
-from unilavira_drake.mllm.request import ImagePart, MllmReply, MllmRequest, VisionVariables
+from unilavira_drake.mllm.reply import MllmReply
+from unilavira_drake.mllm.request import ImagePart, MllmRequest, VisionVariables
 from unilavira_drake.ports import Level, message_input
 from unilavira_drake.tasks import TaskSpec
 from unilavira_drake.vision.reply import parse_vision_reply

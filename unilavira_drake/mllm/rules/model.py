@@ -6,7 +6,8 @@ import json
 from typing import Any
 
 from unilavira_drake.errors import MllmError
-from unilavira_drake.mllm.request import Completion, MllmRequest, VisionVariables
+from unilavira_drake.mllm.reply import Completion
+from unilavira_drake.mllm.request import MllmRequest, VisionVariables
 from unilavira_drake.mllm.rules.check import answer, double_check
 from unilavira_drake.mllm.rules.decide import decide
 from unilavira_drake.mllm.rules.lexicon import unused_words
@@ -29,6 +30,8 @@ class RulesModel:
     name = "rules"
     perception = "ground_truth"
     reasoning = "rules"
+    box_space = "pixels"
+    deadline = 60.0
     description = "rules on the simulator's labels, not a multimodal LLM"
 
     def complete(self, request: MllmRequest) -> Completion:
@@ -44,6 +47,9 @@ class RulesModel:
         else:
             reply = _language_reply(request)
         return Completion(text=json.dumps(reply, ensure_ascii=False))
+
+    def close(self) -> None:
+        """Does nothing: there are no connections."""
 
 
 def _language_reply(request: MllmRequest) -> dict[str, Any]:

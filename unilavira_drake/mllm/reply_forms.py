@@ -1,0 +1,143 @@
+"""The form of each reply: one pydantic model for each call (paper III-B1, III-B2, III-C, III-D).
+
+Reasoning stands before what it decides, since a model writes in this order (paper III-C: separate
+``reasoning_todo`` and ``reasoning_action`` fields).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import pydantic
+
+from unilavira_drake.mllm.reply_model import ReplyModel
+
+
+class UpdateOp(ReplyModel):
+    """Closes an item with its evidence, or opens it again."""
+
+    op: Literal["update"]
+    index: int
+    status: Literal["completed", "pending"]
+    # May be missing: the TODO memory then rolls the completion back and says so.
+    result: str = ""
+
+
+class RewriteOp(ReplyModel):
+    """Words a pending item better."""
+
+    op: Literal["rewrite"]
+    index: int
+    content: str
+
+
+class AddOp(ReplyModel):
+    """Adds an item at a position, or at the end."""
+
+    op: Literal["add"]
+    content: str
+    index: int | None = None
+
+
+class RemoveOp(ReplyModel):
+    """Drops an item."""
+
+    op: Literal["remove"]
+    index: int
+
+
+class Turn(ReplyModel):
+    """Go towards something in one of the four views."""
+
+    tool: Literal["turn"]
+    direction: Literal["front", "left", "right", "back"]
+
+
+class Backtrack(ReplyModel):
+    """Drive back to a waypoint (paper III-D)."""
+
+    tool: Literal["backtrack"]
+    waypoint: int
+
+
+class GoStair(ReplyModel):
+    """Take the stairs."""
+
+    tool: Literal["go_stair"]
+    stair: Literal["up", "down"]
+
+
+class DoubleCheck(ReplyModel):
+    """Propose to stop here."""
+
+    tool: Literal["double_check"]
+
+
+TodoOp = Annotated[
+    UpdateOp | RewriteOp | AddOp | RemoveOp,
+    pydantic.Field(discriminator="op"),
+]
+Tool = Annotated[
+    Turn | Backtrack | GoStair | DoubleCheck,
+    pydantic.Field(discriminator="tool"),
+]
+
+
+class PlanReply(ReplyModel):
+    """Reply to ``plan_todo``."""
+
+    reasoning: str
+    todo: list[str]
+
+
+class ActionReply(ReplyModel):
+    """Reply to ``decide`` and ``recover``; the TODO fields may be left out without a list."""
+
+    progress_analysis: str
+    reasoning_todo: str = ""
+    todo_updates: list[TodoOp] = pydantic.Field(default_factory=list)
+    reasoning_action: str
+    action: Tool
+    scene: str
+
+
+class VerdictReply(ReplyModel):
+    """Reply to ``double_check``."""
+
+    reasoning: str
+    confirmed: bool
+    reason: str
+
+
+class AnswerReply(ReplyModel):
+    """Reply to ``answer``."""
+
+    reasoning: str
+    answer: str
+
+
+class GroundReply(ReplyModel):
+    """Reply to ``ground``: a box, or a point when a box is ill-defined, or neither and why."""
+
+    target_desc: str
+    box: Annotated[list[float], pydantic.Field(min_length=4, max_length=4)] | None
+    point: Annotated[list[float], pydantic.Field(min_length=2, max_length=2)] | None
+    confidence: Annotated[float, pydantic.Field(ge=0.0, le=1.0)] | None
+    reason: str
+
+
+REPLY_MODELS: dict[str, type[ReplyModel]] = {
+    "plan_todo": PlanReply,
+    "decide": ActionReply,
+    "recover": ActionReply,
+    "double_check": VerdictReply,
+    "answer": AnswerReply,
+    "ground": GroundReply,
+}
+"""Call -> the form of its reply; the call ``free`` has none."""
+
+
+def reply_schema(call: str) -> dict[str, Any] | None:
+    """Returns the JSON schema of the reply to a call, or None where any text will do."""
+    form = REPLY_MODELS.get(call)
+    return None if form is None else form.model_json_schema()
