@@ -19,6 +19,8 @@ from pydrake.systems.framework import DiagramBuilder
 from unilavira_drake.episode_monitor import EpisodeMonitor
 from unilavira_drake.messages import LanguageAction, NavigationStatus, Panorama
 from unilavira_drake.messages.metrics import CAUSES, EpisodeMetrics
+from unilavira_drake.mllm.reply import Usage
+from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.scenario import Budgets
 
 PERIOD = 0.1
@@ -169,8 +171,61 @@ def test_any_progress_puts_off_the_stall(news):
     assert bench.metrics.cause == "stalled"
 
 
+MODEL_BUDGETS = {
+    "call_budget": {"model_calls": 5},
+    "token_budget": {"model_tokens": 2200},
+    "model_time_budget": {"model_seconds": 50.0},
+    "cost_budget": {"model_cost_usd": 0.5},
+}
+LANGUAGE = ModelUsage(3, 0, 4, Usage(1000, 100, 8, 0.25), 0.25, 45.0)
+VISION = ModelUsage(2, 1, 2, Usage(1000, 100, 2, None), 0.25, 5.0)
+
+
+@pytest.mark.parametrize("cause", MODEL_BUDGETS)
+def test_the_budgets_of_the_models_count_both_together(cause):
+    bench = Bench(**MODEL_BUDGETS[cause])
+    bench.fix("language_usage", LANGUAGE)
+    bench.fix("vision_usage", ModelUsage())
+    for _ in range(3):
+        bench.tick()
+    assert not bench.metrics.ended
+    bench.fix("vision_usage", VISION)
+    for _ in range(3):
+        bench.tick()
+    assert bench.metrics.cause == cause
+
+
+def test_without_a_budget_nothing_is_counted():
+    bench = Bench()
+    bench.fix("language_usage", LANGUAGE)
+    for _ in range(5):
+        bench.tick()
+    assert not bench.metrics.ended
+
+
+def test_a_stop_in_the_last_reply_of_a_budget_counts():
+    bench = Bench(model_calls=3)
+    bench.tick()
+    bench.fix("language_usage", LANGUAGE)
+    bench.tick()
+    # The language level reads its reply a tick after the link has shown it.
+    bench.fix("language_action", LanguageAction(n=3, call="double_check", tool="stop"))
+    bench.tick()
+    bench.tick()
+    assert bench.metrics.cause == "stopped"
+
+
+def test_an_unreachable_model_ends_the_episode_before_anything_else():
+    bench = Bench(model_calls=1)
+    bench.fix("vision_usage", ModelUsage(1, 1, failure="MllmUnreachable: refused"))
+    bench.fix("language_action", LanguageAction(n=3, call="answer", tool="stop"))
+    bench.tick()
+    bench.tick()
+    assert bench.metrics.cause == "model_unreachable"
+
+
 def test_every_cause_has_its_sentence():
-    assert set(CAUSES) >= {"stopped", "decision_budget", "time_budget", "stalled"}
+    assert set(CAUSES) >= {"stopped", "decision_budget", "time_budget", "stalled", *MODEL_BUDGETS}
     assert all(text.endswith(".") for text in CAUSES.values())
     assert EpisodeMetrics(cause="stopped").ended
 

@@ -2,16 +2,23 @@ from __future__ import annotations
 
 import dataclasses
 import threading
+import time
 from collections.abc import Callable
 
 import pytest
 from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
 
-from unilavira_drake.errors import MllmError
+from unilavira_drake.errors import MllmError, ReplyRefused
 from unilavira_drake.mllm.broker import Broker
-from unilavira_drake.mllm.latency import ConstantLatency, LognormalLatency, NoLatency
-from unilavira_drake.mllm.reply import Completion, MllmReply, Usage
+from unilavira_drake.mllm.latency import (
+    ConstantLatency,
+    LognormalLatency,
+    MeasuredLatency,
+    NoLatency,
+    RealTimeLatency,
+)
+from unilavira_drake.mllm.reply import Attempt, Completion, MllmReply, Usage
 from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.model_link import Latency, ModelLink
@@ -23,13 +30,18 @@ class Backend:
     name = "test"
     perception = "images"
     reasoning = "model"
+    box_space = "pixels"
     description = "A test's own model."
 
-    def __init__(self, reply: Callable[[MllmRequest], str]) -> None:
+    def __init__(self, reply: Callable[[MllmRequest], str], deadline: float) -> None:
+        self.deadline = deadline
         self._reply = reply
 
     def complete(self, request: MllmRequest) -> Completion:
-        return Completion(self._reply(request), COST)
+        return Completion(self._reply(request), COST, latency=1.25)
+
+    def close(self) -> None:
+        pass
 
 
 def _echo(request: MllmRequest) -> str:
@@ -45,7 +57,7 @@ class Bench:
         latency: Latency | None = None,
         deadline: float = 10.0,
     ) -> None:
-        self.broker = Broker(Backend(reply), max_workers=2, deadline=deadline)
+        self.broker = Broker(Backend(reply, deadline), max_workers=2, grace=0.0)
         self.link = ModelLink(broker=self.broker, latency=latency or NoLatency(), period=0.1)
         self.simulator = Simulator(self.link)
         self.ask(self.simulator, MllmRequest())
@@ -93,7 +105,7 @@ def test_no_latency_means_the_next_tick_and_a_reask_is_a_new_request() -> None:
         assert bench.reply(simulator).text == f"1.{attempt}"
     simulator.AdvanceTo(3.0)
     assert bench.broker.calls == 2
-    assert bench.usage(simulator) == ModelUsage(2, 0, Usage(200, 40, 8, 1.0))
+    assert bench.usage(simulator) == ModelUsage(2, 0, 2, Usage(200, 40, 8, 1.0), 1.0, 2.5)
 
 
 def test_clones_share_one_call_and_one_future() -> None:
@@ -131,12 +143,56 @@ def test_an_error_is_a_value() -> None:
     bench.ask(bench.simulator, MllmRequest(n=1))
     bench.simulator.AdvanceTo(1.0)
     reply = bench.reply(bench.simulator)
-    assert (reply.n, reply.text, reply.usage) == (1, "", Usage())
+    assert (reply.n, reply.text, reply.usage) == (1, "", Usage(cost_usd=0.0))
+    assert reply.infrastructure
     assert reply.error == "MllmError: the service answered 503"
     bench.ask(bench.simulator, MllmRequest(n=2))
     bench.simulator.AdvanceTo(2.0)
     assert (bench.reply(bench.simulator).text, bench.reply(bench.simulator).error) == ("fine", "")
-    assert bench.usage(bench.simulator) == ModelUsage(2, 1, COST)
+    usage = bench.usage(bench.simulator)
+    assert (usage.calls, usage.errors, usage.attempts, usage.total) == (2, 1, 2, COST)
+    assert usage.failure == reply.error
+
+
+def test_a_refusal_is_the_model_s_own_and_is_paid_for() -> None:
+    def refuse(request: MllmRequest) -> str:
+        error = ReplyRefused("blocked by a filter")
+        error.attempts, error.latency = (Attempt("m", usage=COST), Attempt("m", usage=COST)), 3.0
+        raise error
+
+    bench = Bench(refuse)
+    bench.ask(bench.simulator, MllmRequest(n=1))
+    bench.simulator.AdvanceTo(1.0)
+    reply = bench.reply(bench.simulator)
+    assert reply.error == "ReplyRefused: blocked by a filter"
+    assert not reply.infrastructure
+    assert reply.usage == COST + COST
+    assert bench.usage(bench.simulator) == ModelUsage(1, 1, 2, COST + COST, 1.0, 3.0)
+
+
+def test_a_measured_latency_is_what_the_model_says_it_took() -> None:
+    bench = Bench(latency=MeasuredLatency())
+    simulator = bench.simulator
+    bench.ask(simulator, MllmRequest(n=1))
+    simulator.AdvanceTo(1.2)  # Asked at 0.0125.
+    assert bench.reply(simulator) == MllmReply()
+    simulator.AdvanceTo(1.4)
+    assert bench.reply(simulator).latency == 1.25
+
+
+def test_in_real_time_the_reply_is_visible_when_it_has_come() -> None:
+    gate = threading.Event()
+    bench = Bench(lambda request: str(gate.wait(10.0)), RealTimeLatency())
+    simulator = bench.simulator
+    bench.ask(simulator, MllmRequest(n=1))
+    simulator.AdvanceTo(30.0)  # The robot goes on.
+    assert bench.reply(simulator) == MllmReply()
+    gate.set()
+    while not bench.broker.done(MllmRequest(n=1)):
+        time.sleep(0.001)
+    simulator.AdvanceTo(30.2)
+    assert bench.reply(simulator).text == "True"
+    assert bench.reply(simulator).latency == pytest.approx(30.0, abs=0.2)
 
 
 def test_silence_is_the_named_timeout() -> None:

@@ -97,6 +97,7 @@ def test_the_later_setting_wins_and_tags_are_read() -> None:
         ("plant.contact_model=sticky", ["plant", "sticky"]),
         ("ablation=no_tmd", ["ablation", "did you mean 'no_tdm'"]),
         ("renderer=vkt", ["renderer", "did you mean 'vtk'"]),
+        ("prompt_preset=papre", ["prompt_preset", "did you mean 'paper'"]),
         ("world.name=flta", ["world.name", "did you mean 'flat'"]),
         ("robot.name=cobot", ["robot.name", "did you mean 'cobot_magic'"]),
         ("language_model=rulez", ["language_model", "rulez"]),

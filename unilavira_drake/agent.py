@@ -15,6 +15,7 @@ from unilavira_drake.memory.waypoint_system import WaypointMemory
 from unilavira_drake.messages import Frame
 from unilavira_drake.mllm.broker import Broker
 from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.mllm.preset import PROMPT_PRESETS
 from unilavira_drake.mllm.reply import Mllm
 from unilavira_drake.model_link import Latency, ModelLink
 from unilavira_drake.vision.system import Vision
@@ -25,8 +26,13 @@ from unilavira_drake.wiring import Wiring
 class ModelChoice:
     """A model and how long it thinks."""
 
-    backend: Mllm
+    broker: Broker
     latency: Latency
+
+    @property
+    def backend(self) -> Mllm:
+        """The model itself."""
+        return self.broker.backend
 
 
 def make_agent(
@@ -41,6 +47,7 @@ def make_agent(
     max_range: float,
     free_distance: Callable[[Frame], float],
     detector: Callable[[Frame], ViewEvidence],
+    prompt_preset: str = "compact",
     replace: MutableMapping[str, System] | None = None,
 ) -> Diagram:
     """Returns the agent; it is the same for every robot.
@@ -48,8 +55,10 @@ def make_agent(
     An ablation is wiring: without TDM ``todo_list`` stays unconnected, without SCB
     ``second_chance`` does.  The detector reaches a level only when its model declares
     ``perception: ground_truth``.  Targets beyond ``max_range`` (metres) are refused.
+    ``prompt_preset`` is a key of ``PROMPT_PRESETS``.
     """
     wiring = Wiring(replace)
+    preset = PROMPT_PRESETS[prompt_preset]
 
     def evidence(model: ModelChoice) -> Callable[[Frame], ViewEvidence] | None:
         return detector if model.backend.perception == "ground_truth" else None
@@ -62,14 +71,24 @@ def make_agent(
             can_climb=can_climb,
             free_distance=free_distance,
             detector=evidence(language_model),
+            view_detail=preset.view_detail,
+            history_detail=preset.history_detail,
         ),
     )
-    wiring.add("vision", lambda: Vision(period=tick, seed=seed, detector=evidence(vision_model)))
+    wiring.add(
+        "vision",
+        lambda: Vision(
+            period=tick,
+            seed=seed,
+            detector=evidence(vision_model),
+            box_space=vision_model.backend.box_space,
+        ),
+    )
     for role, model in (("language", language_model), ("vision", vision_model)):
         wiring.add(
             f"{role}_link",
             lambda model=model: ModelLink(  # type: ignore[misc]
-                broker=Broker(model.backend), latency=model.latency, period=tick
+                broker=model.broker, latency=model.latency, period=tick
             ),
         )
         wiring.connect(role, "model_request", f"{role}_link")
@@ -80,9 +99,10 @@ def make_agent(
             period=tick,
             waypoints=memory.waypoints,
             decisions=memory.decisions,
-            keyframes=memory.keyframes,
+            keyframes=preset.history_factor * memory.keyframes,
             keyframe_travel=memory.keyframe_travel,
             merge_distance=memory.merge_distance,
+            picture_width=preset.history_width,
         ),
     )
     wiring.add("goal_selector", lambda: GoalSelector(max_range=max_range))

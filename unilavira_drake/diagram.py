@@ -13,8 +13,8 @@ from unilavira_drake.agent import ModelChoice, make_agent
 from unilavira_drake.episode_monitor import EpisodeMonitor
 from unilavira_drake.errors import ScenarioError, unknown_name
 from unilavira_drake.messages import Frame
-from unilavira_drake.mllm.backends import make_backend
 from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.model_pair import ModelPair, make_models
 from unilavira_drake.navigation import make_navigation
 from unilavira_drake.recording.recorder import Recorder
 from unilavira_drake.scenario import Scenario
@@ -39,6 +39,7 @@ def make_navigation_diagram(
     detector: Callable[[Frame], ViewEvidence] | None = None,
     goal_distance: Callable[[float, float], float] | None = None,
     on_message: Callable[[float, str, str, object], None] | None = None,
+    models: ModelPair | None = None,
 ) -> Diagram:
     """Returns the whole system of a scenario, ready for a Simulator.
 
@@ -52,12 +53,14 @@ def make_navigation_diagram(
             None when the episode is not scored.
         on_message: called at every tick with (time, system, event, message) for each message
             on a port; a ``recording.message_log.MessageLog`` passes the new ones on.
+        models: the two models, which the caller closes; by default those of the scenario.
 
     Raises:
         InputError: if the scenario names something that does not exist.
         PortTypeError: if a replaced level lacks a port.
     """
     own = dict(replace or {})
+    models = models or make_models(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
     task = choose_task(scenario)
     start = parse_start(task.start, world, radius=scenario.robot.turning_radius)
@@ -76,14 +79,8 @@ def make_navigation_diagram(
     wiring.add(
         "agent",
         lambda: make_agent(
-            language_model=ModelChoice(
-                make_backend(scenario.language_model, place="language_model"),
-                scenario.language_latency,
-            ),
-            vision_model=ModelChoice(
-                make_backend(scenario.vision_model, place="vision_model"),
-                scenario.vision_latency,
-            ),
+            language_model=ModelChoice(models.language, scenario.language_latency),
+            vision_model=ModelChoice(models.vision, scenario.vision_latency),
             memory=scenario.memory,
             ablation=scenario.ablation,
             tick=scenario.tick,
@@ -99,6 +96,7 @@ def make_navigation_diagram(
             detector=functools.lru_cache(FRAMES_KEPT)(
                 detector or GroundTruthDetector(world.labels, max_range=scenario.robot.max_depth)
             ),
+            prompt_preset=scenario.prompt_preset,
             replace=own,
         ),
     )
@@ -164,6 +162,8 @@ def _close_the_ring(wiring: Wiring) -> None:
     wiring.connect("agent", "language_action", "episode_monitor")
     wiring.connect("observer", "panorama", "episode_monitor")
     wiring.connect("navigation", "navigation_status", "episode_monitor")
+    for role in ("language", "vision"):
+        wiring.connect("agent", f"{role}_usage", "episode_monitor")
 
 
 def _listen(wiring: Wiring, *, todo: bool) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,22 @@ from unilavira_drake.diagram import make_navigation_diagram
 from unilavira_drake.episode_result import episode_result
 from unilavira_drake.evaluation.answers import judge_answer
 from unilavira_drake.evaluation.goal_area import success_area
-from unilavira_drake.evaluation.scoring import GoalField, make_goal_field, score, shortest_path
+from unilavira_drake.evaluation.scoring import (
+    GoalField,
+    Score,
+    make_goal_field,
+    score,
+    shortest_path,
+)
 from unilavira_drake.messages import Frame
+from unilavira_drake.messages.metrics import UNREACHABLE
+from unilavira_drake.mllm.broker import AttemptListener
 from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.mllm.latency import RealTimeLatency
+from unilavira_drake.mllm.reply import Attempt
+from unilavira_drake.mllm.request import MllmRequest
+from unilavira_drake.mllm.usage import ModelUsage
+from unilavira_drake.model_pair import ModelPair, make_models
 from unilavira_drake.recording.map_picture import map_picture
 from unilavira_drake.recording.message_log import Listener, MessageLog
 from unilavira_drake.recording.result import EpisodeResult
@@ -28,9 +42,10 @@ from unilavira_drake.recording.tally import Tally
 from unilavira_drake.recording.trace import EpisodeTrace
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.scenario_loading import dump_scenario
-from unilavira_drake.task_choice import choose_task
+from unilavira_drake.task_choice import EpisodeTask, choose_task
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.start import parse_start
+from unilavira_drake.worlds.world import World
 
 ADVANCE = 1.0
 """Simulated seconds that are advanced at once; an interrupt waits no longer."""
@@ -53,6 +68,9 @@ def run_episode(
         replace: user's own Systems, see :func:`make_navigation_diagram`.
         detector: see :func:`make_navigation_diagram`.
 
+    The models are closed at the end.  One that cannot be reached ends the episode with the cause
+    ``model_unreachable``; it is not raised.
+
     Raises:
         InputError: if the scenario, the task or the folder cannot be used.
     """
@@ -68,35 +86,67 @@ def run_episode(
     listeners: list[Listener] = [tally.record, trace.record]
     if on_event is not None:
         listeners.append(on_event)
-    episode = _Run(scenario, goal, listeners, replace, detector)
+    ledgers: list[AttemptListener] = []
     with contextlib.ExitStack() as stack:
+        models = stack.enter_context(make_models(scenario, on_attempt=_to_each(ledgers)))
+        episode = _Run(scenario, models, goal, listeners, replace, detector)
         folder = None
         # Only now: what cannot be built leaves no folder behind.
         if out is not None:
             folder = stack.enter_context(RunFolder(out))
-            folder.write("scenario.yaml", dump_scenario(scenario))
+            # A run that is repeated from its folder must not write to the same cassette.
+            folder.write("scenario.yaml", dump_scenario(dataclasses.replace(scenario, record="")))
             listeners.append(folder.record)
+            ledgers.append(folder.record_attempt)
         episode.simulate()
-        verdict = score(goal, episode.metrics, start[:2], episode.output("observer", "panorama"))
-        if task.answers:
-            stopped = episode.metrics.cause == "stopped"
-            verdict = judge_answer(verdict, tally.answer, task.answers, stopped=stopped)
-        result = episode_result(scenario, task, episode.metrics, verdict, tally)
+        verdict = _verdict(task, episode, goal, start, tally)
+        result = episode_result(
+            scenario, task, episode.metrics, verdict, tally, models, episode.usage
+        )
         if folder is not None:
             folder.write("result.json", result.to_json())
             folder.write("timings.json", json.dumps(episode.timings, indent=2) + "\n")
-            occupancy = episode.output("navigation", "map")
-            goals = () if goal is None else goal.places
-            picture = map_picture(
-                world,
-                trace,
-                occupancy,
-                goals=goals,
-                goal_area=() if goal is None else success_area(goal),
-                title=task.spec.text,
-            )
-            folder.write("map.png", picture)
+            folder.write("map.png", _map(world, trace, episode, goal, task.spec.text))
     return result
+
+
+def _to_each(listeners: Sequence[AttemptListener]) -> AttemptListener:
+    def tell(request: MllmRequest, tries: int, attempt: Attempt) -> None:
+        for listener in listeners:
+            listener(request, tries, attempt)
+
+    return tell
+
+
+def _verdict(
+    task: EpisodeTask,
+    episode: _Run,
+    goal: GoalField | None,
+    start: tuple[float, float, float],
+    tally: Tally,
+) -> Score:
+    """Scores what the agent did; a model that could not be reached is not the agent's doing."""
+    metrics = episode.metrics
+    if metrics.cause == UNREACHABLE:
+        return Score(path_length_m=metrics.path_length)
+    verdict = score(goal, metrics, start[:2], episode.output("observer", "panorama"))
+    if task.answers:
+        stopped = metrics.cause == "stopped"
+        return judge_answer(verdict, tally.answer, task.answers, stopped=stopped)
+    return verdict
+
+
+def _map(
+    world: World, trace: EpisodeTrace, episode: _Run, goal: GoalField | None, title: str
+) -> bytes:
+    return map_picture(
+        world,
+        trace,
+        episode.output("navigation", "map"),
+        goals=() if goal is None else goal.places,
+        goal_area=() if goal is None else success_area(goal),
+        title=title,
+    )
 
 
 class _Run:
@@ -105,6 +155,7 @@ class _Run:
     def __init__(
         self,
         scenario: Scenario,
+        models: ModelPair,
         goal: GoalField | None,
         listeners: list[Listener],
         replace: Mapping[str, System] | None,
@@ -117,8 +168,13 @@ class _Run:
             detector=detector,
             goal_distance=None if goal is None else goal.distance,
             on_message=MessageLog(listeners),
+            models=models,
         )
+        self._models = models
         self._simulator = Simulator(self._diagram)
+        latencies = (scenario.language_latency, scenario.vision_latency)
+        if any(isinstance(latency, RealTimeLatency) for latency in latencies):
+            self._simulator.set_target_realtime_rate(1.0)
         self._interrupted = False
         self.timings = {"build_wall_s": round(time.perf_counter() - started, 3)}
 
@@ -126,12 +182,14 @@ class _Run:
         """Advances until the monitor ends the episode, or a person does."""
         wall, cpu = time.perf_counter(), time.process_time()
         ended = SimulatorStatus.ReturnReason.kReachedTerminationCondition
-        with _one_opencv_thread():
+        # Closed here: the calls that are given up still have their rows in the ledger.
+        with _one_opencv_thread(), self._models:
             try:
                 while self._simulator.AdvanceTo(self._time() + ADVANCE).reason() != ended:
                     pass
             except KeyboardInterrupt:
                 self._interrupted = True
+        self.timings["models_s"] = round(self.usage.seconds, 3)
         self.timings["episode_wall_s"] = round(time.perf_counter() - wall, 3)
         self.timings["episode_cpu_s"] = round(time.process_time() - cpu, 3)
 
@@ -145,6 +203,15 @@ class _Run:
         """The monitor's metrics; the cause is ``interrupted`` when a person ended the run."""
         metrics = self.output("episode_monitor", "metrics")
         return metrics.interrupted() if self._interrupted and not metrics.ended else metrics
+
+    @property
+    def usage(self) -> ModelUsage:
+        """What both models together have used."""
+        usage: ModelUsage = sum(
+            (self.output("agent", f"{role}_usage") for role in ("language", "vision")),
+            ModelUsage(),
+        )
+        return usage
 
     def _time(self) -> float:
         return float(self._context().get_time())

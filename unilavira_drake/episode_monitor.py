@@ -18,7 +18,8 @@ from unilavira_drake.messages import (
     NavigationStatus,
     Panorama,
 )
-from unilavira_drake.messages.metrics import EpisodeMetrics
+from unilavira_drake.messages.metrics import UNREACHABLE, EpisodeMetrics
+from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.ports import InputReader, Level, message_input, pose_input
 from unilavira_drake.scenario import Budgets
 
@@ -46,6 +47,10 @@ class MonitorState(Message):
     status: tuple[int, str] = (0, "arrived")
     yaw: float = 0.0
     in_contact: bool = False
+    usage: tuple[ModelUsage, ...] = ()
+    """Of each connected model."""
+    spent: str = ""
+    """The budget of the models that was found used up one tick ago."""
 
 
 class EpisodeMonitor(Level):
@@ -53,6 +58,10 @@ class EpisodeMonitor(Level):
 
     The causes are those of ``messages.metrics.CAUSES``.  The outcome is written in one tick and
     the simulation ends in the next, so that recorders see it.
+
+    A budget of the models (calls, tokens, seconds, money; both models together) ends the episode
+    one tick after the reply with which it was used up, so that a stop in that reply counts.  The
+    money is what is known to be spent.
 
     Contacts are sampled once per period: a touch shorter than that can be missed, and two touches
     with a shorter gap count as one.  A robot that pushes against something is always seen.
@@ -66,12 +75,14 @@ class EpisodeMonitor(Level):
         - panorama
         - navigation_status
         - contact_results
+        - language_usage (optional)
+        - vision_usage (optional)
         output_ports:
         - metrics
 
     Args:
         period: polling and sampling period, seconds.
-        budgets: decisions, simulated time and stall time.
+        budgets: decisions, simulated time, stall time, and what the models may use.
         goal_distance: geodesic metres from a floor point (x, y) to the goal; None when the
             episode is not scored.
     """
@@ -95,6 +106,9 @@ class EpisodeMonitor(Level):
         self._contacts = InputReader(
             self, "contact_results", ContactResults, AbstractValue.Make(ContactResults())
         )
+        self._usages = tuple(
+            message_input(self, f"{role}_usage", ModelUsage()) for role in ("language", "vision")
+        )
         self.declare_output("metrics", lambda state: state.metrics, EpisodeMetrics())
 
     def step(self, context: Context, state: MonitorState) -> MonitorState | EventStatus:
@@ -104,8 +118,8 @@ class EpisodeMonitor(Level):
         time = context.get_time()
         action = self._action(context)
         new = self._follow_ring(context, self._follow_motion(context, state, time), action, time)
-        new = self._follow_contacts(context, new)
-        cause = _cause(new, action, self._budgets, time)
+        new = self._follow_models(context, self._follow_contacts(context, new))
+        cause = _cause(new, action, self._budgets, time, spent=state.spent)
         if new is state and not cause:
             return state
         return dataclasses.replace(
@@ -172,10 +186,36 @@ class EpisodeMonitor(Level):
         )
         return dataclasses.replace(state, metrics=metrics, in_contact=touching)
 
+    def _follow_models(self, context: Context, state: MonitorState) -> MonitorState:
+        seen = tuple(reader.optional(context) for reader in self._usages)
+        usage = tuple(one for one in seen if one is not None)
+        if usage == state.usage:
+            return state
+        spent = _spent(sum(usage, ModelUsage()), self._budgets)
+        return dataclasses.replace(state, usage=usage, spent=spent)
 
-def _cause(state: MonitorState, action: LanguageAction, budgets: Budgets, time: float) -> str:
+
+def _spent(usage: ModelUsage, budgets: Budgets) -> str:
+    for cause, used, limit in (
+        ("call_budget", usage.calls, budgets.model_calls),
+        ("token_budget", usage.tokens, budgets.model_tokens),
+        ("model_time_budget", usage.seconds, budgets.model_seconds),
+        ("cost_budget", usage.spent_usd, budgets.model_cost_usd),
+    ):
+        if limit is not None and used >= limit:
+            return cause
+    return ""
+
+
+def _cause(
+    state: MonitorState, action: LanguageAction, budgets: Budgets, time: float, *, spent: str
+) -> str:
+    if any(usage.failure for usage in state.usage):
+        return UNREACHABLE
     if action.tool == "stop":
         return "stopped"
+    if spent:
+        return spent
     if state.metrics.decisions >= budgets.decisions and _asks_again(state, action):
         return "decision_budget"
     if time >= budgets.simulated_time:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from unilavira_drake.evaluation.scoring import Score
 from unilavira_drake.messages.metrics import EpisodeMetrics
-from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.mllm.usage import ModelUsage
+from unilavira_drake.model_pair import ModelPair
 from unilavira_drake.recording.result import (
     EpisodeResult,
     MetricsResult,
     ModelResult,
     TaskResult,
     TimeResult,
+    UsageResult,
     installed_versions,
 )
 from unilavira_drake.recording.tally import Tally
@@ -24,18 +26,21 @@ def episode_result(
     metrics: EpisodeMetrics,
     verdict: Score,
     tally: Tally,
+    models: ModelPair,
+    usage: ModelUsage,
 ) -> EpisodeResult:
-    """Returns what ``result.json`` holds."""
+    """Returns what ``result.json`` holds; ``usage`` is that of both models together."""
     return EpisodeResult(
         scored=verdict.success is not None,
         success=verdict.success,
         cause=metrics.cause,
+        error=usage.failure,
         task=TaskResult(task.spec.family, task.spec.text, task.name, task.goal),
         scenario=scenario.name,
         robot=scenario.robot.name,
         ablation=scenario.ablation,
         seed=scenario.random_seed,
-        model=_model(scenario),
+        model=_model(models),
         metrics=MetricsResult(
             navigation_error_m=verdict.navigation_error_m,
             path_length_m=round(verdict.path_length_m, 4),
@@ -51,15 +56,14 @@ def episode_result(
             answer_correct=verdict.answer_correct,
         ),
         counts=tally.counts(metrics.decisions),
-        usage=tally.usage,
+        usage=UsageResult.of(usage),
         time=TimeResult(round(metrics.time, 3)),
         versions=installed_versions(),
     )
 
 
-def _model(scenario: Scenario) -> ModelResult:
-    language = make_backend(scenario.language_model, place="language_model")
-    vision = make_backend(scenario.vision_model, place="vision_model")
+def _model(models: ModelPair) -> ModelResult:
+    language, vision = models.language.backend, models.vision.backend
     # The weaker claim stands for the pair: one level on ground truth taints the whole result.
     perceptions = {language.perception, vision.perception}
     return ModelResult(

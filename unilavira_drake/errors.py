@@ -65,6 +65,8 @@ class MllmError(InfrastructureError):
 
     attempts: tuple[Any, ...] = ()
     """The ``mllm.reply.Attempt`` of each request on the wire before the error."""
+    latency: float | None = None
+    """Wall-clock seconds from the call to the error, or as recorded; None when not told."""
 
 
 class MllmTimeout(MllmError):
@@ -100,6 +102,8 @@ class ReplyFormatError(UniLaviraError):
 
     attempts: tuple[Any, ...] = ()
     """The ``mllm.reply.Attempt`` of each request on the wire, when a backend raises it."""
+    latency: float | None = None
+    """As for ``MllmError``."""
 
 
 class ReplyTruncated(ReplyFormatError):

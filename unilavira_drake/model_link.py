@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
 from pydrake.systems.framework import Context
 
-from unilavira_drake.errors import MllmError
+from unilavira_drake.errors import MllmError, ReplyFormatError
 from unilavira_drake.messages import Message
 from unilavira_drake.mllm.broker import Broker
+from unilavira_drake.mllm.latency import MeasuredLatency, RealTimeLatency
 from unilavira_drake.mllm.reply import Completion, MllmReply
 from unilavira_drake.mllm.request import MllmRequest
-from unilavira_drake.mllm.usage import ModelUsage
+from unilavira_drake.mllm.usage import ModelUsage, paid
 from unilavira_drake.ports import Level, message_input
 
 _TIME_TOLERANCE = 1e-9
 
 
-class Latency(Protocol):
+class DrawnLatency(Protocol):
     """How long a model thinks; a deterministic function of the request."""
 
     def sample(self, request: MllmRequest) -> float:
         """Returns simulated seconds from request to reply."""
+
+
+Latency = DrawnLatency | MeasuredLatency | RealTimeLatency
+"""Drawn from the request, or what the model really takes."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +40,7 @@ class LinkState(Message):
     t_issue: float = 0.0
     """Simulated seconds."""
     t_visible: float = 0.0
-    """When the reply becomes visible, simulated seconds."""
+    """When the reply becomes visible, simulated seconds; infinite until a reply in real time."""
     reply: MllmReply = MllmReply()
     usage: ModelUsage = ModelUsage()
 
@@ -49,10 +55,13 @@ class ModelLink(Level):
 
     A request is new when its (n, attempt) is; the initial request (n = 0) is ignored.  The call
     runs outside the Context from the moment of the request, and is joined at the first tick at
-    or after ``t_issue + latency``; physics goes on meanwhile.  An error of the model is shown as
-    a reply with ``error`` set, never raised.
+    or after ``t_issue + latency``; physics goes on meanwhile.  A measured latency is known only
+    when the reply has come, so the call is joined at once and shown later; in real time it is
+    joined at the first tick after the reply has come.  An error of the model or of the way to it
+    is shown as a reply with ``error`` set, never raised.
 
     .. pydrake_system::
+
         name: ModelLink
         input_ports:
         - model_request
@@ -77,27 +86,49 @@ class ModelLink(Level):
         known = (state.request.n, state.request.attempt)
         if request.n > 0 and (request.n, request.attempt) != known:
             self._broker.submit(request)
-            return dataclasses.replace(
-                state, request=request, t_issue=now, t_visible=now + self._latency.sample(request)
-            )
-        if state.pending and now >= state.t_visible - _TIME_TOLERANCE:
+            delay = self._delay(request)
+            return dataclasses.replace(state, request=request, t_issue=now, t_visible=now + delay)
+        if not state.pending:
+            return state
+        if math.isinf(state.t_visible):
+            if self._broker.done(state.request):
+                return self._joined(dataclasses.replace(state, t_visible=now))
+        elif now >= state.t_visible - _TIME_TOLERANCE:
             return self._joined(state)
         return state
 
-    def _joined(self, state: LinkState) -> LinkState:
-        error = ""
+    def _delay(self, request: MllmRequest) -> float:
+        if isinstance(self._latency, RealTimeLatency):
+            return math.inf
+        if isinstance(self._latency, MeasuredLatency):
+            self._outcome(request)
+            return self._broker.latency(request)
+        return self._latency.sample(request)
+
+    def _outcome(self, request: MllmRequest) -> Completion | MllmError | ReplyFormatError:
         try:
-            completion = self._broker.result(state.request)
-        except MllmError as failure:
-            completion, error = Completion(), f"{type(failure).__name__}: {failure}"
+            return self._broker.result(request)
+        except (MllmError, ReplyFormatError) as error:
+            return error
+
+    def _joined(self, state: LinkState) -> LinkState:
+        outcome = self._outcome(state.request)
         reply = MllmReply(
             n=state.request.n,
             attempt=state.request.attempt,
-            text=completion.text,
-            error=error,
-            usage=completion.usage,
+            text=outcome.text if isinstance(outcome, Completion) else "",
+            error="" if isinstance(outcome, Completion) else _told(outcome),
+            usage=outcome.usage if isinstance(outcome, Completion) else paid(outcome.attempts),
             latency=round(state.t_visible - state.t_issue, 9),
+            infrastructure=isinstance(outcome, MllmError),
         )
-        total = state.usage.total if error else state.usage.total + completion.usage
-        usage = ModelUsage(state.usage.calls + 1, state.usage.errors + bool(error), total)
+        usage = state.usage.after(
+            reply,
+            attempts=len(outcome.attempts) or 1,
+            seconds=self._broker.latency(state.request),
+        )
         return dataclasses.replace(state, reply=reply, usage=usage)
+
+
+def _told(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

@@ -10,13 +10,33 @@ from pydrake.multibody.plant import MultibodyPlantConfig
 
 from unilavira_drake.mapping.config import MappingConfig
 from unilavira_drake.memory.config import MemoryConfig
-from unilavira_drake.mllm.latency import ConstantLatency, LognormalLatency, NoLatency
+from unilavira_drake.mllm.latency import (
+    ConstantLatency,
+    LognormalLatency,
+    MeasuredLatency,
+    NoLatency,
+    PaperLatency,
+    RealTimeLatency,
+    RecordedLatency,
+)
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.robots.cobot_magic import CobotMagic
 
 # What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both.
 ABLATIONS = ("full", "no_tdm", "no_scb", "no_both")
 RENDERERS = ("vtk", "raster")
+
+
+# The first one is meant where a file writes no tag.
+LatencyChoice = (
+    NoLatency
+    | ConstantLatency
+    | LognormalLatency
+    | PaperLatency
+    | RecordedLatency
+    | MeasuredLatency
+    | RealTimeLatency
+)
 
 
 @dc.dataclass
@@ -98,12 +118,9 @@ class Scenario:
     record_mode: str = "record"
     # compact: history in small pictures. paper: every picture in full.
     prompt_preset: str = "compact"
-    language_latency: NoLatency | ConstantLatency | LognormalLatency = dc.field(
-        default_factory=NoLatency
-    )
-    vision_latency: NoLatency | ConstantLatency | LognormalLatency = dc.field(
-        default_factory=NoLatency
-    )
+    # Simulated seconds from a request to its reply.
+    language_latency: LatencyChoice = dc.field(default_factory=NoLatency)
+    vision_latency: LatencyChoice = dc.field(default_factory=NoLatency)
     # full | no_tdm | no_scb | no_both.
     ablation: str = "full"
     # vtk | raster.

@@ -11,9 +11,17 @@ from typing import Any
 from pydrake.multibody.plant import AddMultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
-from unilavira_drake.errors import ScenarioError, TaskError, unknown_name
+from unilavira_drake.errors import InputError, ScenarioError, TaskError, unknown_name
 from unilavira_drake.messages import SWEEP_ORDERS
-from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.mllm.backends import make_backend, profile_of
+from unilavira_drake.mllm.cassette_file import RECORD_MODES
+from unilavira_drake.mllm.latency import (
+    CONDITIONS,
+    PaperLatency,
+    RecordedLatency,
+    recorded_latencies,
+)
+from unilavira_drake.mllm.preset import PROMPT_PRESETS
 from unilavira_drake.scenario import ABLATIONS, RENDERERS, Scenario
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.tasks import FAMILIES, checked_task
@@ -69,12 +77,14 @@ def validate(scenario: Scenario) -> None:
         _check_number(place, value)
     _check_name("ablation", "ablation", scenario.ablation, ABLATIONS)
     _check_name("renderer", "renderer", scenario.renderer, RENDERERS)
+    _check_name("preset", "prompt_preset", scenario.prompt_preset, sorted(PROMPT_PRESETS))
     _check_name("robot", "robot.name", scenario.robot.name, robot_names())
     _check_name(
         "direction", "robot.sweep_direction", scenario.robot.sweep_direction, sorted(SWEEP_ORDERS)
     )
-    for role in ("language_model", "vision_model"):
-        make_backend(getattr(scenario, role), place=role)
+    _check_name("mode", "record_mode", scenario.record_mode, RECORD_MODES)
+    for role in ("language", "vision"):
+        _check_model(scenario, role)
     _check_order(scenario)
     _check_plant(scenario)
     _check_periods(scenario)
@@ -102,6 +112,27 @@ def _check_number(place: str, value: float) -> None:
 def _check_name(kind: str, place: str, name: str, valid: typing.Sequence[str]) -> None:
     if name not in valid:
         raise ScenarioError(unknown_name(kind, name, valid, place))
+
+
+def _check_model(scenario: Scenario, role: str) -> None:
+    place = f"{role}_model"
+    spec = getattr(scenario, place)
+    make_backend(spec, role=role, place=place)
+    profile = profile_of(spec, place=place)
+    if scenario.budgets.model_cost_usd is not None and profile is not None:
+        if profile.prices is None:
+            raise ScenarioError(
+                f"budgets.model_cost_usd: the prices of {place} {spec!r} are not known, so money "
+                "cannot be counted; set another budget, or use a profile with prices."
+            )
+    latency = getattr(scenario, f"{role}_latency")
+    if isinstance(latency, PaperLatency):
+        _check_name("condition", f"{role}_latency.condition", latency.condition, sorted(CONDITIONS))
+    elif isinstance(latency, RecordedLatency):
+        try:
+            recorded_latencies(latency.file, role)
+        except InputError as error:
+            raise ScenarioError(f"{role}_latency.file: {error}") from None
 
 
 def _check_order(scenario: Scenario) -> None:

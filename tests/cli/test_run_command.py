@@ -38,6 +38,7 @@ def test_a_run_tells_its_story_and_leaves_its_folder(capsys: pytest.CaptureFixtu
     folder = Path("runs/apartment-fridge-1")
     assert {path.name for path in folder.iterdir()} == {
         "frames",
+        "ledger.jsonl",
         "map.png",
         "maps",
         "result.json",
@@ -82,7 +83,8 @@ def test_a_machine_without_a_renderer_is_not_the_user_s_mistake(
     monkeypatch.setattr("unilavira_drake.cli.doctor.check_rendering", broken)
     for arguments in (["run"], ["doctor"]):
         assert main(arguments) == 3
-        assert "install libegl1" in capsys.readouterr().err
+        captured = capsys.readouterr()
+        assert "install libegl1" in captured.out + captured.err
     assert not Path("runs").exists()
 
 
@@ -106,7 +108,7 @@ def test_help_names_every_flag_of_the_contract(capsys: pytest.CaptureFixture[str
     assert main(["run", "--help"]) == 0
     text = capsys.readouterr().out
     flags = "task goal start scenario robot model language-model vision-model ablation seed"
-    for flag in [*flags.split(), "max-decisions", "renderer", "set", "out", "meshcat"]:
+    for flag in [*flags.split(), "max-decisions", "renderer", "record", "set", "out", "meshcat"]:
         assert f"--{flag}" in text
 
 

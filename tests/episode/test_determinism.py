@@ -18,7 +18,8 @@ SHORT = LATENCY + "budgets: {decisions: 3}\n"
 
 def files(folder: Path) -> dict[str, bytes]:
     """Returns what a run folder holds, by name, without what measures wall time."""
-    paths = [p for p in folder.rglob("*") if p.is_file() and p.name != "timings.json"]
+    timed = ("timings.json", "ledger.jsonl")
+    paths = [p for p in folder.rglob("*") if p.is_file() and p.name not in timed]
     return {str(p.relative_to(folder)): p.read_bytes() for p in paths}
 
 

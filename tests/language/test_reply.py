@@ -112,14 +112,17 @@ def test_without_a_list_the_todo_fields_may_be_missing() -> None:
         ({"action": {"tool": "stop"}}, {}, "action"),
         ({"action": {"tool": "backtrack", "waypoint": 2}}, {}, "choose among 1, 5"),
         ({"action": {"tool": "backtrack", "waypoint": 99}}, {}, "waypoint 99 may not be chosen"),
-        ({"action": {"tool": "backtrack", "waypoint": "1"}}, {}, "valid integer"),
+        ({"action": {"tool": "backtrack", "waypoint": "one"}}, {}, "valid integer"),
+        ({"action": {"tool": "backtrack", "waypoint": "1.0"}}, {}, "valid integer"),
+        ({"action": {"tool": "backtrack", "waypoint": "2"}}, {}, "choose among 1, 5"),
+        ({"action": {"tool": "backtrack", "waypoint": "9" * 41}}, {}, "valid integer"),
+        ({"action": {"tool": "backtrack", "waypoint": "true"}}, {}, "valid integer"),
         ({"action": {"tool": "backtrack", "waypoint": True}}, {}, "valid integer"),
         ({"action": {"tool": "backtrack", "waypoint": 1}}, {"second_chance": False}, "not offered"),
         ({"action": {"tool": "backtrack", "waypoint": 1}}, {"waypoints": ()}, "no waypoint"),
         ({"action": {"tool": "go_stair", "stair": "sideways"}}, {}, "'up' or 'down'"),
         ({"action": {"tool": "go_stair", "stair": "up"}}, {"can_climb": False}, "cannot climb"),
         ({"action": None}, {}, "action"),
-        ({"thought": "hm"}, {}, "the key thought is not asked for"),
         ({"scene": None}, {}, "scene: input should be a valid string (given: null)"),
         ({"todo_updates": [{"op": "remove", "index": 3}]}, {}, "allows 1 to 2"),
         ({"todo_updates": [{"op": "remove", "index": 0}]}, {}, "operation 1 of todo_updates"),
@@ -127,6 +130,8 @@ def test_without_a_list_the_todo_fields_may_be_missing() -> None:
         ({"todo_updates": [{"op": "remove", "index": 1}]}, {"todo": ()}, "the list is empty"),
         ({"todo_updates": [{"op": "remove", "index": 1}]}, {"todo": None}, "no TODO list"),
         ({"todo_updates": [{"op": "done", "index": 1}]}, {}, "todo_updates.#1"),
+        ({"todo_updates": [{"index": 1}]}, {}, "todo_updates.#1"),
+        ({"action": {"direction": "left"}}, {}, "action"),
         (
             {"todo_updates": [{"op": "update", "index": 1, "status": "skipped", "result": ""}]},
             {},
@@ -153,8 +158,67 @@ def test_a_missing_key_is_named() -> None:
 
 
 def test_many_complaints_are_counted() -> None:
-    with pytest.raises(ReplyFormatError, match=r"\(and 2 more\)"):
+    with pytest.raises(ReplyFormatError, match=r"\(and 1 more\)"):
         _parse({"a": 1})
+
+
+def test_numbers_given_as_text_are_read_and_named() -> None:
+    action = _decide(
+        action={"tool": "backtrack", "waypoint": " 5"},
+        todo_updates=[{"op": "add", "content": "x", "index": "3"}, {"op": "remove", "index": 1}],
+    )
+    assert (action.waypoint, action.todo_updates[0].index) == (5, 3)
+    assert action.repairs == (
+        'the text "3" was read as a number',
+        'the text " 5" was read as a number',
+    )
+
+
+def test_keys_that_are_not_asked_for_are_ignored_and_named() -> None:
+    action = _decide(
+        thought="hm",
+        todo_updates=[{"op": "remove", "index": 1, "why": "done"}],
+        action={"tool": "turn", "direction": "left", "\x1b[2J\ud83d\ude00" + "k" * 60: 2},
+    )
+    assert (action.tool, len(action.todo_updates)) == ("turn", 1)
+    assert action.repairs == (
+        'keys that are not asked for were ignored: "thought"',
+        'keys that are not asked for were ignored: "why"',
+        'keys that are not asked for were ignored: "\\u001b[2J\\ud83d\\ude00' + "k" * 35 + '"',
+    )
+    many = _decide(**{f"key{i}": i for i in range(50)}).repairs
+    assert many == (
+        'keys that are not asked for were ignored: "key0", "key1", "key2", "key3", "key4" and 45 '
+        "more",
+    )
+
+
+def test_repairs_are_named_once_and_counted_when_there_are_many() -> None:
+    remove = {"op": "remove", "index": "1"}
+    twice = _decide(todo_updates=[remove, remove])
+    assert twice.repairs == ('the text "1" was read as a number',)
+    others = [{"op": "remove", "index": 1, f"k{i}": 0} for i in range(20)]
+    assert len(_decide(todo_updates=others).repairs) == 9
+    assert _decide(todo_updates=others).repairs[-1] == "and 12 further repairs"
+
+
+@pytest.mark.parametrize(
+    ("call", "reply"),
+    [
+        ("plan_todo", {"reasoning": "", "todo": ["go"]}),
+        ("decide", DECISION),
+        ("recover", DECISION),
+        ("double_check", {"reasoning": "", "confirmed": True, "reason": ""}),
+        ("answer", {"reasoning": "", "answer": "red"}),
+    ],
+)
+def test_every_call_tells_of_the_text_around_the_object(call: str, reply: Any) -> None:
+    clean = _parse(reply, call)
+    assert clean.repairs == ()
+    around = parse_language_reply(f"Here: {json.dumps(reply)} Bye.", _request(call))
+    assert around == dataclasses.replace(
+        clean, repairs=("text around the JSON object was ignored",)
+    )
 
 
 def test_recover_chooses_from_the_remaining_set() -> None:

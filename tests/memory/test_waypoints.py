@@ -7,11 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from unilavira_drake.memory.waypoints import MemoryBounds, WaypointState, remember
-from unilavira_drake.messages import LanguageAction, Outcome, Panorama, VisionAction
+from unilavira_drake.memory.waypoints import (
+    MemoryBounds,
+    Sight,
+    WaypointState,
+    remember,
+    with_picture,
+)
+from unilavira_drake.messages import KeyPicture, LanguageAction, Outcome, Panorama, VisionAction
 
 NOTHING = LanguageAction()
-BOUNDS = MemoryBounds(waypoints=4, decisions=3, keyframes=2, merge_distance=0.5)
+BOUNDS = MemoryBounds(waypoints=4, decisions=3, keyframes=8, merge_distance=0.5)
 
 
 def panorama(n: int, x: float, y: float, yaw: float = 0.0, **fields: object) -> Panorama:
@@ -33,7 +39,29 @@ def step(
     target: str = "",
 ) -> WaypointState:
     vision = VisionAction(n=action.n, target_desc=target)
-    return remember(state, view, action, vision, b"thumbnail", BOUNDS)
+    return remember(state, view, action, vision, sight(f"front {view.n}"), BOUNDS)
+
+
+def sight(words: str) -> Sight:
+    """Returns a picture that looks like no other: its look is noise drawn from its words."""
+    generator = np.random.default_rng(list(words.encode()))
+    return Sight(words.encode(), generator.integers(0, 256, 768, np.uint8).tobytes())
+
+
+def on_the_way(state: WaypointState, action: LanguageAction, *words: str) -> WaypointState:
+    for word in words:
+        state = with_picture(
+            state,
+            sight(word),
+            n=action.n,
+            waypoint=state.history.current,
+            direction=action.direction,
+        )
+    return state
+
+
+def shown(pictures: tuple[KeyPicture, ...]) -> list[str]:
+    return [f"{picture.number} {picture.jpeg.decode()}" for picture in pictures]
 
 
 def test_first_panorama_makes_the_first_waypoint() -> None:
@@ -74,20 +102,62 @@ def test_reissued_panorama_adds_nothing_but_a_failed_edge() -> None:
     assert edge.outcome == "failed: unreachable"
 
 
-def test_arrived_backtrack_names_the_failed_direction_and_its_frames() -> None:
+def test_arrived_backtrack_names_the_failed_direction_and_its_pictures() -> None:
     state = step(WaypointState(), panorama(1, 0, 0))
-    state = WaypointState(**{**vars(state), "frames": (b"leg1",)})
+    state = on_the_way(state, turn(1, "front"), "leg 1")
     state = step(state, panorama(2, 3, 0), turn(1, "front"))
-    state = WaypointState(**{**vars(state), "frames": (b"leg2a", b"leg2b")})
+    state = on_the_way(state, turn(2, "left"), "leg 2a", "leg 2b")
     state = step(state, panorama(3, 3, 3), turn(2, "left"))
-    state = WaypointState(**{**vars(state), "frames": (b"way back",)})
-    back = LanguageAction(n=3, call="decide", tool="backtrack", waypoint=1)
-    state = step(state, panorama(4, 0, 0), back)
+    back = LanguageAction(n=3, call="decide", tool="backtrack", waypoint=2)
+    state = step(state, panorama(4, 3, 0), back)
     chance = state.second_chance
-    assert chance.failed_direction == "front"
-    assert chance.failed_frames == (b"leg2a", b"leg2b")
+    assert chance.failed_direction == "left"
+    assert shown(chance.failed_frames) == ["4 leg 2a", "5 leg 2b", "6 front 3"]
     assert [e.outcome for e in chance.failed_edges] == ["returned"]
-    assert state.history.current == 1
+    assert state.history.current == 2
+    assert [p.label for p in state.history.keyframes] == [
+        "H1: front view at waypoint 1",
+        "H2: on the way from waypoint 1, towards its front",
+        "H3: front view at waypoint 2",
+        "H4: on the way from waypoint 2, towards its left",
+        "H5: on the way from waypoint 2, towards its left",
+        "H6: front view at waypoint 3",
+    ]
+
+
+def test_what_is_seen_now_is_no_picture_of_the_past() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    assert state.history.keyframes == ()
+    state = step(state, panorama(2, 0, 0, first=1), turn(1, "right"))
+    assert state.history.keyframes == ()
+    state = step(state, panorama(3, 3, 0), turn(2, "front"))
+    assert shown(state.history.keyframes) == ["1 front 1"]
+    assert [w.picture for w in state.history.waypoints] == [1, 2]
+
+
+def test_a_view_like_the_latest_picture_is_not_kept_and_stands_for_its_place() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    state = on_the_way(state, turn(1, "front"), "hall", "hall")
+    like = remember(
+        state, panorama(2, 3, 0), turn(1, "front"), VisionAction(), sight("hall"), BOUNDS
+    )
+    assert shown(like.history.keyframes) == ["1 front 1", "2 hall"]
+    assert [w.picture for w in like.history.waypoints] == [1, 2]
+
+
+def test_the_history_grows_at_its_end_and_loses_four_at_once() -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    numbers: list[int] = []
+    for n in range(2, 40):
+        state = step(state, panorama(n, 3.0 * n, 0), turn(n - 1, "front"))
+        now = [picture.number for picture in state.history.keyframes]
+        assert now == list(range(now[0], n))
+        assert len(now) == n - 1 if n <= 12 else 8 <= len(now) <= 11
+        if numbers:
+            dropped = now[0] - numbers[0]
+            assert dropped in (0, 4)
+            assert now[: len(numbers) - dropped] == numbers[dropped:]
+        numbers = now
 
 
 def test_failed_direction_is_told_in_the_words_of_the_present_panorama() -> None:
@@ -127,13 +197,13 @@ def test_a_way_that_got_stuck_half_way_is_the_one_that_failed() -> None:
     back = LanguageAction(n=2, call="decide", tool="backtrack", waypoint=1)
     state = step(state, panorama(3, 0, 0), back)
     assert state.second_chance.failed_direction == "left"
-    state = WaypointState(**{**vars(state), "frames": (b"to the right",)})
+    state = on_the_way(state, turn(3, "right"), "to the right")
     stuck = panorama(4, 2, -2, outcome=Outcome("failed", "stuck"))
     state = step(state, stuck, turn(3, "right"))
     back = LanguageAction(n=4, call="decide", tool="backtrack", waypoint=1)
     state = step(state, panorama(5, 0, 0), back)
     assert state.second_chance.failed_direction == "right"
-    assert state.second_chance.failed_frames == (b"to the right",)
+    assert shown(state.second_chance.failed_frames) == ["3 to the right", "4 front 4"]
     assert [e.outcome for e in state.history.edges] == ["returned", "failed: stuck"]
 
 

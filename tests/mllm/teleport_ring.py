@@ -19,7 +19,7 @@ from unilavira_drake.language.reply import parse_language_reply
 from unilavira_drake.language.variables import language_request
 from unilavira_drake.mapping.goal_selector import select_goal
 from unilavira_drake.memory.todo import apply_updates
-from unilavira_drake.memory.waypoints import MemoryBounds, WaypointState, remember
+from unilavira_drake.memory.waypoints import MemoryBounds, Sight, WaypointState, remember
 from unilavira_drake.messages import LanguageAction, Outcome, TodoList, VisionAction
 from unilavira_drake.mllm.request import MllmRequest, VisionVariables
 from unilavira_drake.sensors.detections import GroundTruthDetector
@@ -128,7 +128,7 @@ def run(
             panorama = home.caster.panorama(n, *pose, outcome)
         else:
             panorama = dataclasses.replace(panorama, n=n, outcome=outcome)
-        state = remember(state, panorama, action, vision, b"", BOUNDS)
+        state = remember(state, panorama, action, vision, Sight(), BOUNDS)
         request = language_request(
             call=next_call(action, outcome, family=family, has_todo=todo),
             seed=seed, task=TaskSpec(family, text), panorama=panorama, history=state.history,

@@ -82,13 +82,13 @@ def test_other_calls(model):
 
 
 def test_backends_say_what_they_are():
-    rules = make_backend("rules", place="language_model")
+    rules = make_backend("rules", role="language", place="language_model")
     assert isinstance(rules, RulesModel)
     assert (rules.perception, rules.reasoning) == ("ground_truth", "rules")
     assert "not a multimodal LLM" in rules.description
-    assert isinstance(make_backend("rules:default", place="here"), RulesModel)
+    assert isinstance(make_backend("rules:default", role="language", place="here"), RulesModel)
     for spec, kind in (("random", RandomModel), ("frontier", FrontierModel)):
-        model = make_backend(spec, place="here")
+        model = make_backend(spec, role="language", place="here")
         assert isinstance(model, kind)
         assert "lower bound" in model.description
 
@@ -100,5 +100,5 @@ def test_backends_say_what_they_are():
 )  # fmt: skip
 def test_an_unknown_spec_names_the_nearest(spec, near):
     with pytest.raises(ScenarioError, match=near) as error:
-        make_backend(spec, place="vision_model")
+        make_backend(spec, role="language", place="vision_model")
     assert "vision_model" in str(error.value)

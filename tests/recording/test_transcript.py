@@ -15,11 +15,11 @@ from unilavira_drake.messages import (
     Goal,
     History,
     Intrinsics,
+    KeyPicture,
     LanguageAction,
     OccupancyMap,
     Panorama,
     TodoUpdate,
-    Waypoint,
 )
 from unilavira_drake.recording.transcript import plain, transcript_line
 
@@ -58,10 +58,10 @@ def test_a_frame_is_its_jpeg_view_and_intrinsics() -> None:
 
 def test_pictures_in_a_history_are_kept_and_other_bytes_are_not() -> None:
     pictures: dict[str, bytes] = {}
-    history = History(n=1, waypoints=(Waypoint(thumbnail=JPEG),), keyframes=(b"no jpeg", b""))
-    data = plain(history, pictures)
-    assert data["waypoints"][0]["thumbnail"] == DIGEST
-    assert data["keyframes"] == [hashlib.sha256(b"no jpeg").hexdigest(), ""]
+    kept = tuple(KeyPicture(jpeg=jpeg) for jpeg in (JPEG, b"no jpeg", b""))
+    data = plain(History(n=1, keyframes=kept), pictures)
+    digests = [picture["jpeg"] for picture in data["keyframes"]]
+    assert digests == [DIGEST, hashlib.sha256(b"no jpeg").hexdigest(), ""]
     assert pictures == {DIGEST: JPEG}
 
 

@@ -26,6 +26,7 @@ from unilavira_drake.messages import (
     NavigationStatus,
     Sweep,
 )
+from unilavira_drake.mllm.broker import Broker
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.latency import ConstantLatency
 from unilavira_drake.mllm.reply import Completion
@@ -62,7 +63,12 @@ class Body(Level):
         self._goal = message_input(self, "goal", Goal())
         self._sweep = message_input(self, "sweep", Sweep())
         self.declare_output("navigation_status", lambda s: s.status, NavigationStatus())
-        self._image_port("front.color_image", ImageRgba8U(8, 6))
+        self.DeclareAbstractOutputPort(
+            "front.color_image",
+            lambda: Value[ImageRgba8U](ImageRgba8U(8, 6)),
+            self._show,
+            prerequisites_of_calc=self._state_tickets,
+        )
         depth = ImageDepth32F(8, 6)
         depth.mutable_data[:] = WALL_DISTANCE
         self._image_port("front.depth_image", depth)
@@ -85,6 +91,14 @@ class Body(Level):
             lambda context, output: output.set_value(image),
             prerequisites_of_calc={self.nothing_ticket()},
         )
+
+    def _show(self, context: Context, output: AbstractValue) -> None:
+        # Each square metre and each direction looks different.
+        body = self.state(context)
+        place = [round(body.x) % 256, round(body.y) % 256, round(2 * body.yaw) % 256]
+        image = ImageRgba8U(8, 6)
+        image.mutable_data[:] = np.random.default_rng(place).integers(0, 256, (6, 8, 4))
+        output.set_value(image)
 
     def _pose_port(self, name: str, view: Any) -> None:
         self.DeclareAbstractOutputPort(
@@ -134,6 +148,8 @@ class ScriptedModel:
     perception: str = "images"
     reasoning: str = "rules"
     description: str = "a script for tests"
+    box_space: str = "pixels"
+    deadline: float = 60.0
 
     def complete(self, request: MllmRequest) -> Completion:
         """Returns the scripted reply."""
@@ -141,6 +157,9 @@ class ScriptedModel:
         key = (request.n, request.attempt)
         text = self.replies.get(key, self.replies.get(request.n, self.default))
         return Completion(text)
+
+    def close(self) -> None:
+        """Does nothing."""
 
     def request(self, n: int, attempt: int = 0) -> MllmRequest:
         """Returns what was asked under this number."""
@@ -200,8 +219,8 @@ def make_ring(
     wiring.add(
         "agent",
         lambda: make_agent(
-            language_model=ModelChoice(language, ConstantLatency(latency)),
-            vision_model=ModelChoice(vision, ConstantLatency(latency / 8)),
+            language_model=ModelChoice(Broker(language), ConstantLatency(latency)),
+            vision_model=ModelChoice(Broker(vision), ConstantLatency(latency / 8)),
             memory=MemoryConfig(),
             ablation=ablation,
             tick=0.1,

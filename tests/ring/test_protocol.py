@@ -18,10 +18,12 @@ from dummy_levels import (
 )
 from pydrake.systems.analysis import Simulator
 
+from unilavira_drake.errors import ReplyRefused
 from unilavira_drake.language.system import Language
 from unilavira_drake.memory.todo_system import TodoMemory
 from unilavira_drake.memory.waypoint_system import WaypointMemory
 from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.mllm.reply import Completion
 from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.tasks import TaskSpec
 from unilavira_drake.vision.system import Vision
@@ -126,16 +128,33 @@ def test_recover_names_the_failed_direction(shown: ScriptedModel) -> None:
     recover = shown.request(7)
     assert recover.variables.failed_direction == "front"
     assert any("waypoint 1, front" in edge for edge in recover.variables.failed_edges)
-    assert any(image.label.startswith("failed leg") for image in recover.images)
+    named = {image.label.partition(":")[0] for image in recover.images}
+    assert recover.variables.failed_pictures
+    assert named.issuperset(recover.variables.failed_pictures)
 
 
 def test_pictures_of_the_places_to_go_back_to_are_shown(shown: ScriptedModel) -> None:
     labels = [image.label for image in shown.request(6).images]
-    offered = [w.id for w in shown.request(6).variables.waypoints if w.offered]
+    offered = [w for w in shown.request(6).variables.waypoints if w.offered]
     assert offered
-    assert [label for label in labels if label.startswith("waypoint")] == [
-        f"waypoint {waypoint}" for waypoint in offered
-    ]
+    assert {f"{w.picture}: front view at waypoint {w.id}" for w in offered} <= set(labels)
+
+
+def test_a_picture_keeps_its_name_and_none_is_sent_twice(shown: ScriptedModel) -> None:
+    first: dict[str, bytes] = {}
+    for request in shown.requests:
+        past = {i.label: i.jpeg for i in request.images if i.label.startswith("H")}
+        assert len(past) == len(set(past.values())) == len(request.images) - 4
+        for label, jpeg in past.items():
+            assert first.setdefault(label, jpeg) == jpeg
+        # Back at a place, its front looks as it did.
+        revisited = {w.picture for w in request.variables.waypoints if w.distance < 0.1}
+        front = request.images[-4].jpeg
+        assert [label.partition(":")[0] in revisited for label in past if past[label] == front] in (
+            [],
+            [True],
+        )
+    assert len(first) >= 4
 
 
 def test_rejected_stop_is_fed_back(shown: ScriptedModel) -> None:
@@ -152,8 +171,38 @@ def test_unusable_replies_become_the_safe_action() -> None:
     language = ScriptedModel({1: plan("go"), 3: decide("double_check"), 4: verdict(True)}, "bad")
     diagram = make_ring(language, ScriptedModel({}, select()))
     run_until_stop(diagram)
-    assert [r.attempt for r in language.requests if r.n == 2] == [0, 1, 2]
+    assert [r.attempt for r in language.requests if r.n == 2] == [0, 1]
     assert language.request(3).variables.outcome.startswith("failed: model error")
+
+
+class RefusingModel(ScriptedModel):
+    """Refuses to answer at one number."""
+
+    refused = 2
+
+    def complete(self, request: MllmRequest) -> Completion:
+        completion = super().complete(request)
+        if request.n == self.refused:
+            raise ReplyRefused("the provider's filter: picture 3.")
+        return completion
+
+
+def test_a_refusal_is_not_asked_again() -> None:
+    language = RefusingModel(
+        {
+            1: plan("go"),
+            3: decide("turn", direction="front"),
+            4: decide("double_check"),
+            5: verdict(True),
+        }
+    )
+    vision = RefusingModel({}, select())
+    vision.refused = 3
+    run_until_stop(make_ring(language, vision))
+    assert [r.attempt for r in language.requests if r.n == 2] == [0]
+    assert language.request(3).variables.outcome.startswith("failed: model error: ReplyRefused")
+    assert [r.attempt for r in vision.requests] == [0]
+    assert language.request(4).variables.outcome.startswith("failed: no target")
 
 
 def test_unusable_plan_becomes_the_task_itself() -> None:
@@ -216,7 +265,7 @@ def test_calls_do_not_depend_on_the_periods_of_the_levels() -> None:
                 period=periods[3],
                 waypoints=32,
                 decisions=8,
-                keyframes=6,
+                keyframes=8,
                 keyframe_travel=1.5,
                 merge_distance=0.5,
             ),

@@ -5,7 +5,8 @@ code   meaning
 =====  ==========================================================================
 0      the episode ended, also without success
 2      bad input: the message names place, value and remedy
-3      the machine or a service is not able (no renderer, model unreachable)
+3      the machine or a service is not able (no renderer, model unreachable); for
+       ``ask`` also a reply that was refused or cut off
 130    interrupted; what was done is kept
 =====  ==========================================================================
 """
@@ -17,10 +18,12 @@ from collections.abc import Sequence
 
 import typer
 
+from unilavira_drake.cli.ask import ask
 from unilavira_drake.cli.doctor import doctor
 from unilavira_drake.cli.listing import ports, scenarios
 from unilavira_drake.cli.report import report
 from unilavira_drake.cli.run import run
+from unilavira_drake.cli.serve import serve
 from unilavira_drake.errors import InfrastructureError, InputError
 
 BAD_INPUT, INFRASTRUCTURE = 2, 3
@@ -32,7 +35,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (run, report, ports, scenarios, doctor):
+for command in (run, report, ask, serve, ports, scenarios, doctor):
     app.command()(command)
 
 

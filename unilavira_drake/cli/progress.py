@@ -20,6 +20,7 @@ from unilavira_drake.messages import (
     VisionAction,
 )
 from unilavira_drake.messages.metrics import EpisodeMetrics
+from unilavira_drake.mllm.mailbox import REPLIES, MailboxModel
 from unilavira_drake.mllm.reply import Mllm
 from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.task_choice import EpisodeTask
@@ -35,6 +36,7 @@ class Progress:
         self._status: Status | None = None
         self._began = time.perf_counter()
         self._todo: tuple[TodoItem, ...] = ()
+        self._mailboxes: dict[str, MailboxModel] = {}
 
     def __enter__(self) -> Progress:
         """Begins to measure wall time, and shows the live line on a terminal."""
@@ -56,6 +58,9 @@ class Progress:
 
     def introduce(self, *, language: Mllm, vision: Mllm, task: EpisodeTask) -> None:
         """Says what the models are, and what the task is."""
+        for role, model in (("language", language), ("vision", vision)):
+            if isinstance(model, MailboxModel):
+                self._mailboxes[role] = model
         if language.description == vision.description:
             self._line(f"model: {language.description}", "bold")
         else:
@@ -67,7 +72,10 @@ class Progress:
 
     def record(self, t: float, system: str, event: str, message: Any) -> None:
         """Takes a new message at a time, simulated seconds."""
-        if isinstance(message, LanguageAction):
+        if isinstance(message, MllmRequest) and message.role in self._mailboxes:
+            place = self._mailboxes[message.role].place(message)
+            self._line(f"{_INDENT}reply to {place / REPLIES[0]}", "magenta")
+        elif isinstance(message, LanguageAction):
             self._decision(t, message)
         elif isinstance(message, TodoList):
             self._todo_list(message)

@@ -13,8 +13,9 @@ import typer
 from unilavira_drake.cli.progress import Progress
 from unilavira_drake.cli.summary import print_summary
 from unilavira_drake.episode import run_episode
-from unilavira_drake.errors import InputError
-from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.errors import InfrastructureError, InputError
+from unilavira_drake.messages.metrics import UNREACHABLE
+from unilavira_drake.mllm.backends import SPECS, make_backend
 from unilavira_drake.recording.run_folder import fresh_folder
 from unilavira_drake.rendering_check import check_rendering
 from unilavira_drake.scenario import Scenario
@@ -42,9 +43,7 @@ def run(
         str, _option("Name or file; default: apartment.", "NAME|FILE.yaml")
     ] = "apartment",
     robot: Annotated[str | None, _option("Robot.", "NAME")] = None,
-    model: Annotated[
-        str | None, _option("Both models: rules[:PRESET], random or frontier.", "SPEC")
-    ] = None,
+    model: Annotated[str | None, _option(f"Both models. SPEC: {SPECS}.", "SPEC")] = None,
     language_model: Annotated[str | None, _option("The language model.", "SPEC")] = None,
     vision_model: Annotated[str | None, _option("The vision model.", "SPEC")] = None,
     ablation: Annotated[
@@ -54,6 +53,10 @@ def run(
     max_decisions: Annotated[str | None, _option("Ends the episode.", "N")] = None,
     renderer: Annotated[
         str | None, _option("Renderer of the camera; default: raster.", "vtk|raster")
+    ] = None,
+    record: Annotated[
+        str | None,
+        _option("Keeps every reply of the models in this new file, a cassette.", "FILE"),
     ] = None,
     setting: Annotated[
         list[str] | None,
@@ -82,6 +85,7 @@ def run(
         "random_seed": seed,
         "budgets.decisions": max_decisions,
         "renderer": renderer,
+        "record": record,
         "meshcat": meshcat or None,
     }
     if task is not None:
@@ -108,11 +112,12 @@ def run_watched(scenario: Scenario, out: Path) -> None:
 
     Raises:
         typer.Exit: with 130 after an interrupt.
+        InfrastructureError: if a model could not be reached; what was done is kept.
     """
     progress = Progress()
     progress.introduce(
-        language=make_backend(scenario.language_model, place="language_model"),
-        vision=make_backend(scenario.vision_model, place="vision_model"),
+        language=make_backend(scenario.language_model, role="language", place="language_model"),
+        vision=make_backend(scenario.vision_model, role="vision", place="vision_model"),
         task=choose_task(scenario),
     )
     try:
@@ -121,6 +126,8 @@ def run_watched(scenario: Scenario, out: Path) -> None:
     except KeyboardInterrupt:
         raise typer.Exit(INTERRUPTED) from None
     print_summary(result, out, progress.console)
+    if result.cause == UNREACHABLE:
+        raise InfrastructureError(result.error)
     if result.cause == "interrupted":
         raise typer.Exit(INTERRUPTED)
 

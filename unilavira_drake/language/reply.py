@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from unilavira_drake.errors import ReplyFormatError
 from unilavira_drake.messages import DIRECTIONS, LanguageAction, TodoUpdate
 from unilavira_drake.mllm.reply_forms import (
@@ -18,7 +20,7 @@ from unilavira_drake.mllm.reply_forms import (
     UpdateOp,
     VerdictReply,
 )
-from unilavira_drake.mllm.reply_model import bounded, clipped
+from unilavira_drake.mllm.reply_model import ReplyModel, bounded, clipped
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 
 MAX_PLAN_ITEMS = 32
@@ -35,7 +37,8 @@ def parse_language_reply(text: str, request: MllmRequest) -> LanguageAction:
 
     ``plan_todo`` becomes ``stay`` with one ``add`` for each item; a confirmed ``double_check``
     becomes ``stop``, or ``stay`` for EQA, where the ``answer`` call follows; a rejected one
-    becomes ``stay`` with the reason; an answer becomes ``stop``.
+    becomes ``stay`` with the reason; an answer becomes ``stop``.  What was forgiven in the text
+    stands in ``repairs``.
 
     Raises:
         ReplyFormatError: if the text has another form, or names a direction, waypoint, stair or
@@ -44,7 +47,13 @@ def parse_language_reply(text: str, request: MllmRequest) -> LanguageAction:
     variables = request.variables
     if not isinstance(variables, LanguageVariables):
         raise TypeError(f"request {request.n} of role {request.role!r} has no language variables")
-    reply = REPLY_MODELS[request.call].read(text)
+    reply, repairs = REPLY_MODELS[request.call].read(text)
+    return dataclasses.replace(_action(reply, request, variables), repairs=repairs)
+
+
+def _action(
+    reply: ReplyModel, request: MllmRequest, variables: LanguageVariables
+) -> LanguageAction:
     if isinstance(reply, PlanReply):
         return _plan(reply, request)
     if isinstance(reply, VerdictReply):

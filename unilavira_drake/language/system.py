@@ -28,7 +28,8 @@ from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 from unilavira_drake.ports import Level, message_input
 from unilavira_drake.tasks import TaskSpec
 
-MAX_REASKS = 2
+MAX_REASKS = 1
+"""A reply that cannot be used is asked for once more, with what was wrong; a refusal is not."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,9 @@ class LanguageState(Message):
 class Language(Level):
     """Turns panorama n, history n and TODO list n - 1 into language action n.
 
-    A reply that cannot be used is re-asked twice with what was wrong; then a documented safe
-    action takes its place (``fallback``): the task itself as the only TODO item, no movement,
-    a rejected stop, an empty answer.
+    A reply that cannot be used is re-asked once with what was wrong.  After that, and at once when
+    an error takes the place of a reply, a documented safe action is published (``fallback``): the
+    task itself as the only TODO item, no movement, a rejected stop, an empty answer.
 
     .. pydrake_system::
 
@@ -66,6 +67,8 @@ class Language(Level):
         can_climb: whether the prompt offers stairs.
         free_distance: metres free along the axis of a view.
         detector: evidence for a model declared ``ground_truth``; None for all others.
+        view_detail: how finely the model looks at the four views, see ``ImagePart``.
+        history_detail: how finely it looks at pictures of the past.
     """
 
     def __init__(
@@ -76,12 +79,16 @@ class Language(Level):
         can_climb: bool,
         free_distance: Callable[[Frame], float],
         detector: Callable[[Frame], ViewEvidence] | None = None,
+        view_detail: str = "medium",
+        history_detail: str = "low",
     ) -> None:
         super().__init__(LanguageState(), period=period)
         self._seed = seed
         self._can_climb = can_climb
         self._free_distance = free_distance
         self._detector = detector
+        self._view_detail = view_detail
+        self._history_detail = history_detail
         self._task = message_input(self, "task", TaskSpec())
         self._panorama = message_input(self, "panorama", Panorama())
         self._history = message_input(self, "history", History())
@@ -97,6 +104,9 @@ class Language(Level):
             return self._ask(context, state)
         reply = self._reply(context)
         if (reply.n, reply.attempt) != (state.request.n, state.request.attempt):
+            return state
+        if reply.infrastructure:
+            # The monitor ends the episode; nothing is to be decided in the agent's name.
             return state
         return self._conclude(state, reply)
 
@@ -126,6 +136,8 @@ class Language(Level):
             can_climb=self._can_climb,
             free_distance=self._free_distance,
             detector=self._detector,
+            view_detail=self._view_detail,
+            history_detail=self._history_detail,
         )
         return dataclasses.replace(state, request=request)
 

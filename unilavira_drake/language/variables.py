@@ -11,6 +11,7 @@ from unilavira_drake.messages import (
     Edge,
     Frame,
     History,
+    KeyPicture,
     LanguageAction,
     Panorama,
     SecondChance,
@@ -43,12 +44,17 @@ def language_request(
     can_climb: bool,
     free_distance: Callable[[Frame], float],
     detector: Callable[[Frame], ViewEvidence] | None,
+    view_detail: str = "medium",
+    history_detail: str = "low",
 ) -> MllmRequest:
     """Returns the first attempt of call ``panorama.n``.
 
     ``second_chance`` and ``todo`` are None when SCB and TDM are not wired.  The detector's
     evidence is added only when one is given, that is for a model declared ``ground_truth``.
+    Its images are the pictures of the past, oldest first, those of a failed leg that the history
+    no longer shows, and the four views; no picture is sent twice.
     """
+    failed_frames = () if second_chance is None else second_chance.failed_frames
     rejected = last_action.call == "double_check" and last_action.confirmed is False
     variables = LanguageVariables(
         family=task.family,
@@ -73,6 +79,7 @@ def language_request(
         if second_chance is None
         else _failed_edges(second_chance, history, panorama),
         failed_direction="" if second_chance is None else second_chance.failed_direction,
+        failed_pictures=tuple(picture.name for picture in failed_frames),
         can_climb=can_climb,
     )
     return MllmRequest(
@@ -81,18 +88,31 @@ def language_request(
         seed=seed,
         call=call,
         variables=variables,
-        images=_images(panorama, history, second_chance),
+        images=_past_images(history, failed_frames, history_detail)
+        + tuple(ImagePart(f"view {d}", panorama.frame(d).jpeg, view_detail) for d in DIRECTIONS),
         evidence=None
         if detector is None
         else tuple(detector(panorama.frame(direction)) for direction in DIRECTIONS),
     )
 
 
+_NOT_A_MOVE = {
+    ("plan_todo", "stay"): "the plan was made",
+    ("double_check", "stay"): "the stop was checked",
+    ("decide", "double_check"): "asked to stop",
+    ("recover", "double_check"): "asked to stop",
+}
+
+
 def decision_text(record: DecisionRecord) -> str:
     """Returns a past decision in words, e.g. ``turn left to 'white door': arrived``."""
+    place = f"at waypoint {record.waypoint}"
+    known = _NOT_A_MOVE.get((record.call, record.tool))
+    if known is not None:
+        return f"{place}: {known}"
     action = " ".join(part for part in (record.tool, record.argument) if part)
     target = f" to '{record.target_desc}'" if record.target_desc else ""
-    return f"at waypoint {record.waypoint}: {action}{target}: {record.outcome}"
+    return f"{place}: {action}{target}: {record.outcome}"
 
 
 def _outcome(panorama: Panorama) -> str:
@@ -134,12 +154,17 @@ def _waypoint_note(
             and (second_chance is not None or edge.outcome == "arrived")
         ),
         offered=second_chance is not None and waypoint.id in second_chance.offers,
+        picture=next((p.name for p in history.keyframes if p.number == waypoint.picture), ""),
     )
 
 
 def _edge_text(edge: Edge, front: float) -> str:
-    target = f" at waypoint {edge.to}" if edge.to is not None else ""
-    return f"{direction_of(edge.bearing - front)}: {edge.outcome}{target}"
+    direction = direction_of(edge.bearing - front)
+    if edge.outcome == "returned":
+        place = f" after waypoint {edge.to}" if edge.to is not None else ""
+        return f"{direction}: given up{place}"
+    place = f" at waypoint {edge.to}" if edge.to is not None else ""
+    return f"{direction}: {edge.outcome}{place}"
 
 
 def _failed_edges(
@@ -159,22 +184,10 @@ def _front(waypoint: Waypoint, panorama: Panorama, history: History) -> float:
     return panorama.yaw if waypoint.id == history.current else waypoint.heading
 
 
-def _images(
-    panorama: Panorama, history: History, second_chance: SecondChance | None
+def _past_images(
+    history: History, failed_frames: tuple[KeyPicture, ...], detail: str
 ) -> tuple[ImagePart, ...]:
-    views = tuple(ImagePart(f"view {d}", panorama.frame(d).jpeg) for d in DIRECTIONS)
-    offers = () if second_chance is None else second_chance.offers
-    places = tuple(
-        ImagePart(f"waypoint {waypoint.id}", waypoint.thumbnail)
-        for waypoint in history.waypoints
-        if waypoint.id in offers and waypoint.thumbnail
+    dropped = tuple(picture for picture in failed_frames if picture not in history.keyframes)
+    return tuple(
+        ImagePart(picture.label, picture.jpeg, detail) for picture in (*history.keyframes, *dropped)
     )
-    leg = tuple(
-        ImagePart(f"on the way here, {i + 1} of {len(history.keyframes)}", jpeg)
-        for i, jpeg in enumerate(history.keyframes)
-    )
-    frames = () if second_chance is None else second_chance.failed_frames
-    failed = tuple(
-        ImagePart(f"failed leg, {i + 1} of {len(frames)}", jpeg) for i, jpeg in enumerate(frames)
-    )
-    return places + leg + failed + views

@@ -10,8 +10,10 @@ class MemoryConfig:
     waypoints: int = 32
     # Decisions told in the history.
     decisions: int = 8
-    # Egocentric key frames of one leg, and the travel between two of them, metres.
-    keyframes: int = 6
+    # Pictures of the past that stay in the prompt once there are so many; the oldest are dropped
+    # four at a time, so up to three more are shown. The preset paper keeps twice as many.
+    keyframes: int = 8
+    # Travel between two pictures on the way, metres.
     keyframe_travel: float = 1.5
     # A place closer than this to a waypoint is that waypoint, metres.
     merge_distance: float = 0.5

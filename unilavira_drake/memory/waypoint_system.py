@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageRgba8U
 
-from unilavira_drake.memory.waypoints import MemoryBounds, WaypointState, remember
+from unilavira_drake.memory.pictures import VIEW_CHANGE, look_of
+from unilavira_drake.memory.waypoints import (
+    MemoryBounds,
+    Sight,
+    Watch,
+    WaypointState,
+    remember,
+    with_picture,
+)
 from unilavira_drake.messages import (
     History,
     LanguageAction,
@@ -24,14 +32,18 @@ from unilavira_drake.sensors.encoding import encode_jpeg, rgb_of
 NUMBERS_PER_WAYPOINT = 5
 """Id, x, y, z (metres) and heading (radians); an id of 0 marks a free slot."""
 
-THUMBNAIL_WIDTH = 320
+WATCH_TRAVEL = 0.25
+"""The way is watched this often, metres: travel is summed in such steps, and a robot that turns in
+place is not watched at all."""
 
 
 class WaypointMemory(Level):
     """Keeps the waypoint buffer: history n and second chance n from panorama n and action n - 1.
 
-    While the robot drives it takes an egocentric key frame every ``keyframe_travel`` metres; the
-    colour image is rendered only then.
+    Its pictures of the past are the front view at each new waypoint and, while the robot drives
+    to a new place, what it sees every ``keyframe_travel`` metres and after each 45 degrees of
+    turning; the colour image is rendered only then.  A picture that looks like the latest one is
+    not kept, and none is taken on a way back, which shows nothing new.
 
     .. pydrake_system::
 
@@ -51,9 +63,11 @@ class WaypointMemory(Level):
         period: polling period, seconds.
         waypoints: size of the buffer; the oldest but the first is evicted.
         decisions: past decisions told in the history.
-        keyframes: most frames of one leg.
-        keyframe_travel: travel between two key frames, metres.
+        keyframes: pictures of the past that stay in the history once there are so many; the
+            oldest are dropped in blocks of four.
+        keyframe_travel: travel between two pictures on the way, metres.
         merge_distance: a panorama this close to a waypoint is at that waypoint, metres.
+        picture_width: width of the pictures, pixels; None keeps the camera's.
     """
 
     def __init__(
@@ -65,10 +79,12 @@ class WaypointMemory(Level):
         keyframes: int,
         keyframe_travel: float,
         merge_distance: float,
+        picture_width: int | None = 320,
     ) -> None:
         super().__init__(WaypointState(), period=period)
         self._bounds = MemoryBounds(waypoints, decisions, keyframes, merge_distance)
         self._keyframe_travel = keyframe_travel
+        self._picture_width = picture_width
         self._panorama = message_input(self, "panorama", Panorama())
         self._action = message_input(self, "language_action", LanguageAction())
         self._vision = message_input(self, "vision_action", VisionAction())
@@ -88,21 +104,40 @@ class WaypointMemory(Level):
         action = self._action(context)
         if action.n != panorama.n - 1:
             return state
-        thumbnail = b""
+        sight = Sight()
         if panorama.first == panorama.n:
-            thumbnail = encode_jpeg(panorama.frame("front").color, width=THUMBNAIL_WIDTH)
-        return remember(state, panorama, action, self._vision(context), thumbnail, self._bounds)
+            sight = self._sight(panorama.frame("front").color)
+        return remember(state, panorama, action, self._vision(context), sight, self._bounds)
 
     def _watch(self, context: Context, state: WaypointState) -> WaypointState:
         if state.history.n == 0:
             return state
-        x, y, _ = self._pose(context).translation()
-        if math.dist((x, y), state.last_frame_position) < self._keyframe_travel:
+        X_WB = self._pose(context)
+        x, y, _ = X_WB.translation()
+        step = math.dist((x, y), state.watch.position)
+        if step < WATCH_TRAVEL:
             return state
-        jpeg = encode_jpeg(rgb_of(pixels(self._color(context))), width=THUMBNAIL_WIDTH)
-        return dataclasses.replace(
-            state, frames=(*state.frames, jpeg), last_frame_position=(float(x), float(y))
+        rotation = X_WB.rotation().matrix()
+        yaw = math.atan2(rotation[1, 0], rotation[0, 0])
+        travelled = state.watch.travelled + step
+        change = abs(math.remainder(yaw - state.watch.picture_yaw, 2 * math.pi))
+        watch = Watch((float(x), float(y)), state.watch.picture_yaw, travelled)
+        if travelled < self._keyframe_travel and change < VIEW_CHANGE:
+            return dataclasses.replace(state, watch=watch)
+        state = dataclasses.replace(state, watch=Watch(watch.position, yaw))
+        action = self._action(context)
+        if action.n != state.history.n or action.tool != "turn":
+            return state
+        return with_picture(
+            state,
+            self._sight(rgb_of(pixels(self._color(context)))),
+            n=action.n,
+            waypoint=state.history.current,
+            direction=action.direction,
         )
+
+    def _sight(self, color: NDArray[np.uint8]) -> Sight:
+        return Sight(encode_jpeg(color, width=self._picture_width), look_of(color))
 
     def _buffer(self, state: WaypointState) -> NDArray[np.float64]:
         buffer = np.zeros((self._bounds.waypoints, NUMBERS_PER_WAYPOINT))

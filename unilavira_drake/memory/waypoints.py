@@ -2,7 +2,7 @@
 
 One call of :func:`remember` per panorama: it adds or re-visits a waypoint, closes the edge that
 led here, and, when a backtrack has arrived, names the direction that failed from this place with
-the egocentric frames of the failed leg.
+the pictures of the failed leg.
 """
 
 from __future__ import annotations
@@ -11,11 +11,19 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
+from unilavira_drake.memory.pictures import (
+    MOST_KEPT,
+    SAME_LOOK,
+    look_difference,
+    of_failed_leg,
+    shown,
+)
 from unilavira_drake.messages import (
     VIEW_YAW,
     DecisionRecord,
     Edge,
     History,
+    KeyPicture,
     LanguageAction,
     Message,
     Panorama,
@@ -27,11 +35,23 @@ from unilavira_drake.messages import (
 
 
 @dataclass(frozen=True)
-class Leg(Message):
-    """The egocentric JPEG frames captured while action ``n`` was carried out."""
+class Sight(Message):
+    """A picture that may be kept, and its look (``pictures.look_of``)."""
 
-    n: int = 0
-    frames: tuple[bytes, ...] = ()
+    jpeg: bytes = b""
+    look: bytes = b""
+
+
+@dataclass(frozen=True)
+class Watch(Message):
+    """Where the robot was watched on its way, and how far that is from the latest picture."""
+
+    position: tuple[float, float] = (0.0, 0.0)
+    """Metres in the world."""
+    picture_yaw: float = 0.0
+    """World yaw of the latest view that was considered for a picture, radians."""
+    travelled: float = 0.0
+    """Metres since then."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +62,11 @@ class WaypointState(Message):
     second_chance: SecondChance = SecondChance()
     yaw: float = 0.0
     """World yaw of ``front`` of the latest panorama, radians."""
-    legs: tuple[Leg, ...] = ()
-    """Finished legs, oldest first."""
-    frames: tuple[bytes, ...] = ()
-    """Frames of the running leg."""
-    last_frame_position: tuple[float, float] = (math.inf, math.inf)
+    pictures: tuple[KeyPicture, ...] = ()
+    """All remembered pictures, oldest first."""
+    look: bytes = b""
+    """The look of the latest of them."""
+    watch: Watch = Watch()
     next_id: int = 1
 
 
@@ -57,7 +77,26 @@ class MemoryBounds:
     waypoints: int
     decisions: int
     keyframes: int
+    """Pictures that a prompt shows at least, once there are so many."""
     merge_distance: float
+
+
+def with_picture(
+    state: WaypointState, sight: Sight, *, n: int, waypoint: int, direction: str = ""
+) -> WaypointState:
+    """Returns the memory with a picture more, unless it looks like the latest one.
+
+    Args:
+        n: the panorama whose front view it is, or the language action being carried out.
+        direction: on the way: in which direction the waypoint was left.
+    """
+    if not sight.jpeg or look_difference(sight.look, state.look) < SAME_LOOK:
+        return state
+    number = state.pictures[-1].number + 1 if state.pictures else 1
+    picture = KeyPicture(number, n, waypoint, direction, sight.jpeg)
+    return dataclasses.replace(
+        state, pictures=(*state.pictures, picture)[-MOST_KEPT:], look=sight.look
+    )
 
 
 def remember(
@@ -65,92 +104,130 @@ def remember(
     panorama: Panorama,
     action: LanguageAction,
     vision: VisionAction,
-    thumbnail: bytes,
+    sight: Sight,
     bounds: MemoryBounds,
 ) -> WaypointState:
     """Returns the memory after panorama n, to which ``action`` (n - 1) led.
 
     Args:
         vision: the vision action of ``action``; ignored unless its number is the same.
-        thumbnail: small JPEG of the front view, kept if a waypoint is added.
+        sight: the front view, kept if a waypoint is added.
     """
     old = state.history
     target = vision.target_desc if vision.n == action.n and action.tool == "turn" else ""
     outcome = panorama.outcome.state
     if panorama.outcome.reason:
         outcome += f": {panorama.outcome.reason}"
-    waypoints = tuple(
-        dataclasses.replace(w, scene=action.scene) if w.id == old.current and action.scene else w
-        for w in old.waypoints
-    )
+    state = _described(state, action)
     back = action.tool == "backtrack" and panorama.outcome.state == "arrived"
     if back and action.waypoint is not None and old.waypoint(action.waypoint) is not None:
         # Room to turn may have moved the goal a little; the place is the one that was meant.
-        current, next_id = action.waypoint, state.next_id
+        current = action.waypoint
     else:
-        current, waypoints, next_id = _place(state, waypoints, panorama, target, thumbnail, bounds)
+        state, current = _place(state, panorama, target, sight, bounds)
+    waypoints = state.history.waypoints
     kept = {waypoint.id for waypoint in waypoints}
     edges = tuple(edge for edge in old.edges if edge.waypoint in kept)
     if action.tool == "turn":
         bearing = state.yaw + VIEW_YAW[action.direction]
         to = current if panorama.outcome.state == "arrived" and current != old.current else None
         edges += (Edge(old.current, action.direction, bearing, action.n, outcome, to),)
-    legs = (*state.legs, Leg(action.n, state.frames))[-bounds.waypoints :]
     returned = None
     if back:
         edges, returned = _mark_returned(edges, current, action.n)
-    decisions = old.decisions
-    if action.n:
-        record = DecisionRecord(
-            action.n, action.call, action.tool, action.argument, old.current, target, outcome
-        )
-        decisions = (*decisions, record)
-        decisions = decisions[max(0, len(decisions) - bounds.decisions) :]
+    decisions = _decided(old, action, target, outcome, bounds.decisions)
     n = panorama.n
-    history = History(n, current, waypoints, edges, decisions, _spread(state.frames, bounds))
-    second_chance = SecondChance(
-        n=n,
-        offers=tuple(w.id for w in waypoints if w.id != current),
-        failed_edges=tuple(e for e in edges if e.outcome.startswith(("failed", "returned"))),
-        failed_direction="" if returned is None else direction_of(returned.bearing - panorama.yaw),
-        failed_frames=() if returned is None else _failed_frames(legs, returned, action.n, bounds),
-    )
-    return WaypointState(
-        history=history,
-        second_chance=second_chance,
+    # What is seen now is no picture of the past yet: the prompt shows it in full anyway.
+    past = tuple(p for p in state.pictures if p.direction or p.n != panorama.first)
+    window = shown(past, bounds.keyframes)
+    return dataclasses.replace(
+        state,
+        history=History(n, current, waypoints, edges, decisions, window),
+        second_chance=_second_chance(n, current, panorama, state, edges, returned, window),
         yaw=panorama.yaw,
-        legs=legs,
-        last_frame_position=panorama.position[:2],
-        next_id=next_id,
+        watch=Watch(panorama.position[:2], panorama.yaw),
     )
+
+
+def _described(state: WaypointState, action: LanguageAction) -> WaypointState:
+    """Returns the memory with the action's words for the place where it was decided."""
+    old = state.history
+    if not action.scene:
+        return state
+    waypoints = tuple(
+        dataclasses.replace(w, scene=action.scene) if w.id == old.current else w
+        for w in old.waypoints
+    )
+    return dataclasses.replace(state, history=dataclasses.replace(old, waypoints=waypoints))
+
+
+def _decided(
+    old: History, action: LanguageAction, target: str, outcome: str, most: int
+) -> tuple[DecisionRecord, ...]:
+    if not action.n:
+        return old.decisions
+    record = DecisionRecord(
+        action.n, action.call, action.tool, action.argument, old.current, target, outcome
+    )
+    decisions = (*old.decisions, record)
+    return decisions[max(0, len(decisions) - most) :]
+
+
+def _second_chance(
+    n: int,
+    current: int,
+    panorama: Panorama,
+    state: WaypointState,
+    edges: tuple[Edge, ...],
+    returned: Edge | None,
+    window: tuple[KeyPicture, ...],
+) -> SecondChance:
+    offers = tuple(w.id for w in state.history.waypoints if w.id != current)
+    failed = tuple(e for e in edges if e.outcome.startswith(("failed", "returned")))
+    if returned is None:
+        return SecondChance(n, offers, failed)
+    # From leaving the place until the backtrack began; nothing is kept on a way back.
+    leg = tuple(p for p in state.pictures if _on_leg(p, returned))
+    direction = direction_of(returned.bearing - panorama.yaw)
+    return SecondChance(n, offers, failed, direction, of_failed_leg(leg, window))
+
+
+def _on_leg(picture: KeyPicture, left: Edge) -> bool:
+    """Whether a picture was taken after a place was left: on the way, or at a later waypoint."""
+    return picture.n > left.n or (picture.n == left.n and bool(picture.direction))
 
 
 def _place(
     state: WaypointState,
-    waypoints: tuple[Waypoint, ...],
     panorama: Panorama,
     target: str,
-    thumbnail: bytes,
+    sight: Sight,
     bounds: MemoryBounds,
-) -> tuple[int, tuple[Waypoint, ...], int]:
-    """Returns the current waypoint's id, the buffer and the next free id."""
+) -> tuple[WaypointState, int]:
+    """Returns the memory with the place of a panorama in it, and the place's id."""
+    history = state.history
     if panorama.first != panorama.n:
-        return state.history.current, waypoints, state.next_id
-    near = min(waypoints, key=lambda w: math.dist(w.position, panorama.position), default=None)
+        return state, history.current
+    near = min(
+        history.waypoints, key=lambda w: math.dist(w.position, panorama.position), default=None
+    )
     if near is not None and math.dist(near.position, panorama.position) < bounds.merge_distance:
-        return near.id, waypoints, state.next_id
+        return state, near.id
+    state = with_picture(state, sight, n=panorama.n, waypoint=state.next_id)
     added = Waypoint(
         id=state.next_id,
         n=panorama.n,
         position=panorama.position,
         heading=panorama.yaw,
         target_desc=target,
-        thumbnail=thumbnail,
+        picture=state.pictures[-1].number if state.pictures else 0,
     )
+    waypoints = history.waypoints
     if len(waypoints) >= bounds.waypoints:
         # The start stays: it is the one place from which everything else was reached.
         waypoints = (waypoints[0], *waypoints[2:])
-    return added.id, (*waypoints, added), state.next_id + 1
+    history = dataclasses.replace(history, waypoints=(*waypoints, added))
+    return dataclasses.replace(state, history=history, next_id=added.id + 1), added.id
 
 
 def _mark_returned(
@@ -167,19 +244,3 @@ def _mark_returned(
                 edge = dataclasses.replace(edge, outcome="returned")
             return (*edges[:i], edge, *edges[i + 1 :]), edge
     return edges, None
-
-
-def _failed_frames(
-    legs: tuple[Leg, ...], returned: Edge, backtrack: int, bounds: MemoryBounds
-) -> tuple[bytes, ...]:
-    """Returns the frames from leaving the place until the backtrack began."""
-    frames = tuple(f for leg in legs if returned.n <= leg.n < backtrack for f in leg.frames)
-    return _spread(frames, bounds)
-
-
-def _spread(frames: tuple[bytes, ...], bounds: MemoryBounds) -> tuple[bytes, ...]:
-    """Returns at most ``bounds.keyframes`` frames, evenly spread, the last one included."""
-    count, most = len(frames), bounds.keyframes
-    if count <= most:
-        return frames
-    return tuple(frames[round((i + 1) * count / most) - 1] for i in range(most))

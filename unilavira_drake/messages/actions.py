@@ -49,6 +49,8 @@ class LanguageAction(Message):
     answer: str = ""
     fallback: bool = False
     """Whether the documented safe action took the place of unusable replies."""
+    repairs: tuple[str, ...] = ()
+    """What was forgiven in the model's text to read it, one sentence each."""
 
     @property
     def argument(self) -> str:
@@ -76,3 +78,5 @@ class VisionAction(Message):
     """Why nothing was selected; empty when a box or a point was."""
     fallback: bool = False
     """Whether unusable replies left nothing to select."""
+    repairs: tuple[str, ...] = ()
+    """What was forgiven in the model's text to read it, one sentence each."""

@@ -41,14 +41,41 @@ class Waypoint(Message):
     """The vision action that led here."""
     scene: str = ""
     """The language model's sentence about the place."""
-    thumbnail: bytes = b""
-    """The front view as a small JPEG."""
+    picture: int = 0
+    """Number of the key picture that shows its front view; 0 when none does."""
 
     @property
     def caption(self) -> str:
         """Target and scene in one line of at most 160 characters; quoted as data in prompts."""
         text = "; ".join(part for part in (self.target_desc, self.scene) if part)
         return text if len(text) <= 160 else text[:159] + "…"
+
+
+@dataclass(frozen=True)
+class KeyPicture(Message):
+    """A picture kept for the history, under a number that it never loses."""
+
+    number: int = 0
+    """Counts from 1 in the order of capture."""
+    n: int = 0
+    """The panorama whose front view it is; on the way: the language action carried out then."""
+    waypoint: int = 0
+    """Where it was taken; on the way: the waypoint that the robot had left."""
+    direction: str = ""
+    """On the way: the direction in which the waypoint was left; empty for a view at a waypoint."""
+    jpeg: bytes = b""
+
+    @property
+    def name(self) -> str:
+        """How prompts name it, e.g. ``H7``."""
+        return f"H{self.number}"
+
+    @property
+    def label(self) -> str:
+        """Name and what it is, e.g. ``H7: on the way from waypoint 2, left to its left``."""
+        if self.direction:
+            return f"{self.name}: on the way from waypoint {self.waypoint}, towards its {self.direction}"
+        return f"{self.name}: front view at waypoint {self.waypoint}"
 
 
 @dataclass(frozen=True)
@@ -91,8 +118,8 @@ class History(Message):
     waypoints: tuple[Waypoint, ...] = ()
     edges: tuple[Edge, ...] = ()
     decisions: tuple[DecisionRecord, ...] = ()
-    keyframes: tuple[bytes, ...] = ()
-    """Egocentric JPEG frames of the latest leg, oldest first."""
+    keyframes: tuple[KeyPicture, ...] = ()
+    """Pictures at waypoints and on the way, oldest first; older ones are dropped in blocks."""
 
     def waypoint(self, waypoint_id: int) -> Waypoint | None:
         """Returns the waypoint with this id, or None when it is unknown or was evicted."""
@@ -112,5 +139,6 @@ class SecondChance(Message):
     failed_edges: tuple[Edge, ...] = ()
     failed_direction: str = ""
     """On arrival after a backtrack: the direction that failed from here, else empty."""
-    failed_frames: tuple[bytes, ...] = ()
-    """On arrival after a backtrack: egocentric JPEG frames of the failed leg, oldest first."""
+    failed_frames: tuple[KeyPicture, ...] = ()
+    """On arrival after a backtrack: pictures of the failed leg, oldest first; some of them may no
+    longer be among the history's key frames."""

@@ -8,11 +8,18 @@ from dataclasses import dataclass
 
 from unilavira_drake.messages.frozen import Message
 
+UNREACHABLE = "model_unreachable"
+"""The cause with which nothing is scored."""
 CAUSES = {
     "stopped": "The agent ended the episode by its own verified stop.",
     "decision_budget": "The decisions of the budget are used up, and the last one is carried out.",
     "time_budget": "The simulated time of the budget is over.",
+    "call_budget": "The model calls of the budget are used up.",
+    "token_budget": "The tokens of the budget are used up.",
+    "model_time_budget": "The models have taken all the seconds of the budget.",
+    "cost_budget": "The money of the budget is spent.",
     "stalled": "For the stall time no panorama, action, status or motion was new.",
+    UNREACHABLE: "A model could not be reached or gave no reply; nothing is scored.",
     "interrupted": "A person stopped the run; what was done until then is kept.",
 }
 """Every cause with which an episode ends, and what it means."""

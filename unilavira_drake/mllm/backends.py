@@ -3,35 +3,76 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
-from unilavira_drake.errors import ScenarioError, unknown_name
+from unilavira_drake.errors import InputError, ScenarioError, unknown_name
 from unilavira_drake.mllm.baselines import FrontierModel, RandomModel
+from unilavira_drake.mllm.mailbox import MailboxModel
+from unilavira_drake.mllm.profile import Profile
+from unilavira_drake.mllm.profiles import AD_HOC, load_profile, profile_names
+from unilavira_drake.mllm.remote import RemoteModel
+from unilavira_drake.mllm.replay import CassetteModel
 from unilavira_drake.mllm.reply import Mllm
 from unilavira_drake.mllm.rules import RulesModel
 
-_BACKENDS: dict[str, Callable[[], Mllm]] = {
+SPECS = (
+    "rules[:PRESET] | random | frontier | cassette:FILE | mailbox:DIR | PROFILE | PROFILE.yaml | "
+    "openai:MODEL@BASE_URL"
+)
+"""What a spec may be, for help texts."""
+
+_PROGRAMS: dict[str, Callable[[], Mllm]] = {
     "rules": RulesModel,
     "random": RandomModel,
     "frontier": FrontierModel,
 }
+_FOLDERS = {"cassette": "cassette:FILE", "mailbox": "mailbox:DIR"}
+_FILES = (".yaml", ".yml")
 PRESETS: dict[str, tuple[str, ...]] = {"rules": ("default",)}
 """Backend -> what may follow its name after a colon."""
 
 
-def make_backend(spec: str, *, place: str) -> Mllm:
-    """Returns the model that a spec names: ``rules[:PRESET]``, ``random`` or ``frontier``.
+def make_backend(spec: str, *, role: str, place: str) -> Mllm:
+    """Returns the model that a spec names, see ``SPECS``.
+
+    Nothing is written, connected or started before its first call.
 
     Args:
+        role: ``language`` | ``vision``: for which of the two it answers.
         place: where the spec stands, e.g. ``language_model``; opens an error's message.
 
     Raises:
-        ScenarioError: if the backend or its preset is unknown; names the nearest valid one.
+        ScenarioError: if the spec names nothing that can be used; names the nearest valid one.
     """
-    name, colon, preset = spec.partition(":")
-    if name not in _BACKENDS:
-        raise ScenarioError(unknown_name("model", spec, _BACKENDS, place))
-    if colon and preset not in PRESETS.get(name, ()):
-        raise ScenarioError(
-            unknown_name(f"preset of {name!r}", preset, PRESETS.get(name, ()), place)
-        )
-    return _BACKENDS[name]()
+    profile = profile_of(spec, place=place)
+    if profile is not None:
+        return RemoteModel(profile, role=role)
+    name, _, rest = spec.partition(":")
+    if name in _FOLDERS:
+        if not rest:
+            raise ScenarioError(f"{place}: {spec!r} must be {_FOLDERS[name]}.")
+        path = Path(rest).expanduser()
+        try:
+            return CassetteModel(path, role=role) if name == "cassette" else MailboxModel(path)
+        except InputError as error:
+            raise ScenarioError(f"{place}: {error}") from None
+    if name not in _PROGRAMS:
+        names = (*_PROGRAMS, *_FOLDERS.values(), f"{AD_HOC}MODEL@BASE_URL", *profile_names())
+        raise ScenarioError(unknown_name("model", spec, names, place))
+    presets = PRESETS.get(name, ())
+    if spec != name and rest not in presets:
+        raise ScenarioError(unknown_name(f"preset of {name!r}", rest, presets, place))
+    return _PROGRAMS[name]()
+
+
+def profile_of(spec: str, *, place: str) -> Profile | None:
+    """Returns the profile that a spec names; None for a model without one.
+
+    Raises:
+        ScenarioError: if the profile cannot be used.
+    """
+    if spec.partition(":")[0] in (*_PROGRAMS, *_FOLDERS):
+        return None
+    if spec.startswith(AD_HOC) or spec.endswith(_FILES) or spec in profile_names():
+        return load_profile(spec, place=place)
+    return None

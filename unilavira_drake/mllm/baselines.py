@@ -13,7 +13,8 @@ from typing import Any
 
 from unilavira_drake.errors import MllmError
 from unilavira_drake.messages import DIRECTIONS, VIEW_YAW
-from unilavira_drake.mllm.reply import Completion
+from unilavira_drake.mllm.boxes import BOX_SPACES
+from unilavira_drake.mllm.reply import Completion, Usage
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, VisionVariables
 
 STOP_CHANCE = 0.1
@@ -46,7 +47,7 @@ class RandomModel:
         if isinstance(variables, VisionVariables):
             u = generator.uniform(0.1, 0.9) * variables.width
             v = generator.uniform(0.55, 0.95) * variables.height
-            return _completion(_point(u, v, "a random point"))
+            return _completion(_point(u, v, "a random point", variables))
         if request.call in ("decide", "recover"):
             if generator.random() < STOP_CHANCE:
                 return _completion(_action({"tool": "double_check"}, "a random stop"))
@@ -78,7 +79,7 @@ class FrontierModel:
         variables = request.variables
         if isinstance(variables, VisionVariables):
             u, v = variables.width / 2.0, _FLOOR_ROW * variables.height
-            return _completion(_point(u, v, "floor ahead"))
+            return _completion(_point(u, v, "floor ahead", variables))
         if isinstance(variables, LanguageVariables) and request.call in ("decide", "recover"):
             if request.n > FRONTIER_DECISIONS:
                 return _completion(_action({"tool": "double_check"}, "enough was seen"))
@@ -117,14 +118,15 @@ def _generator(request: MllmRequest) -> random.Random:
 
 
 def _completion(reply: dict[str, Any]) -> Completion:
-    return Completion(text=json.dumps(reply))
+    return Completion(json.dumps(reply), Usage(cost_usd=0.0))
 
 
-def _point(u: float, v: float, target: str) -> dict[str, Any]:
+def _point(u: float, v: float, target: str, variables: VisionVariables) -> dict[str, Any]:
+    space = BOX_SPACES[variables.box_space]
     return {
         "target_desc": target,
         "box": None,
-        "point": [u, v],
+        "point": space.from_pixels_point((u, v), variables.width, variables.height),
         "confidence": None,
         "reason": "chosen without looking at the picture",
     }

@@ -23,7 +23,8 @@ class RoleSettings(_Data):
     max_output_tokens: int = pydantic.Field(default=4096, gt=0)
     """Hidden reasoning included."""
     thinking: str = ""
-    """Gemini: the thinking level; empty leaves it to the provider."""
+    """Gemini: the thinking level; OpenAI-compatible: ``reasoning_effort``.  Empty leaves it to the
+    provider."""
     attempt_deadline: float = pydantic.Field(default=180.0, gt=0.0)
     deadline: float = pydantic.Field(default=420.0, gt=0.0)
     """All attempts of one call together, waiting included."""

@@ -1,8 +1,12 @@
-"""From a request's typed variables to the text that a real model reads.
+"""From a request's typed variables to the texts and pictures that a real model reads.
 
 The words live in ``prompts/`` as jinja2 templates without code; this module only renders them.
-Everything that a model, a scene or a person has written is quoted as one JSON string, so it can
-neither end its quotation nor start a line of the prompt.
+Everything that a model, a scene or a person has written is quoted as one JSON string of bounded
+length, so it can neither end its quotation nor start a line of the prompt.
+
+What stays the same from call to call comes first, for the caches of providers: the rules, the
+task, the pictures of the past, which are only added to until the oldest are dropped in a block.
+Then comes what changes: notes, this call's question, the views, events, the TODO list.
 """
 
 from __future__ import annotations
@@ -17,8 +21,17 @@ from dataclasses import dataclass
 import jinja2
 
 from unilavira_drake.messages import Message
-from unilavira_drake.mllm.request import FreeVariables, ImagePart, MllmRequest
+from unilavira_drake.mllm.boxes import BOX_SPACES
+from unilavira_drake.mllm.request import FreeVariables, ImagePart, MllmRequest, VisionVariables
 from unilavira_drake.resources import prompts_path
+
+
+@dataclass(frozen=True)
+class Place:
+    """A picture as templates see it: its label, and its index in the request."""
+
+    label: str
+    index: int
 
 
 @dataclass(frozen=True)
@@ -32,7 +45,7 @@ class Prompt(Message):
     @property
     def text(self) -> str:
         """All of it as one text, each picture as a line with its number and label."""
-        lines, number = [self.system], 0
+        lines, number = [self.system + "\n"] if self.system else [], 0
         for part in self.parts:
             if isinstance(part, ImagePart):
                 number += 1
@@ -48,33 +61,48 @@ class Prompt(Message):
 
 
 def compose_prompt(request: MllmRequest) -> Prompt:
-    """Returns the prompt of a request as the texts and pictures that go to a model."""
-    if isinstance(request.variables, FreeVariables):
-        return Prompt(parts=(*request.images, request.variables.text))
-    return Prompt(parts=(*request.images, render_prompt(request)))
+    """Returns the prompt of a request as the texts and pictures that go to a model.
 
-
-def render_prompt(request: MllmRequest) -> str:
-    """Returns the prompt of a request: stable rules first, the situation and the TODO list last.
-
-    The ground-truth evidence of a request is never part of it; its images are named in their
-    order and travel beside the text.
+    The ground-truth evidence of a request is never part of it.  An image whose label is ``view``
+    and the direction of a view stands beside that view's line; all others are pictures of the
+    past, in their order.  A free text is sent as it is, after its pictures.
 
     Raises:
         jinja2.TemplateError: if the call or the family has no template, or a template names a
             variable that the request lacks (both are bugs, not conditions).
     """
-    template = _environment().get_template(f"{request.role}/{request.call}.txt.j2")
     variables = request.variables
+    if isinstance(variables, FreeVariables):
+        return Prompt(parts=(*request.images, variables.text))
     values = {field.name: getattr(variables, field.name) for field in dataclasses.fields(variables)}
-    text = template.render(
-        **values,
-        call=request.call,
-        feedback=request.feedback,
-        pictures=tuple(image.label for image in request.images),
-    )
+    if isinstance(variables, VisionVariables):
+        directions = [variables.direction]
+        values["places"] = BOX_SPACES[variables.box_space].rule(variables.width, variables.height)
+    else:
+        directions = [view.direction for view in variables.views]
+    labels = {f"view {direction}" for direction in directions}
+    places = tuple(Place(image.label, index) for index, image in enumerate(request.images))
+    values |= {
+        "feedback": request.feedback,
+        "past": tuple(place for place in places if place.label not in labels),
+        "current": tuple(place for place in places if place.label in labels),
+    }
+    system = _rendered(f"{request.role}/system.txt.j2", values)
+    text = _rendered(f"{request.role}/{request.call}.txt.j2", values)
+    return Prompt(system, _placed(text, request.images))
+
+
+def _rendered(template: str, values: dict[str, object]) -> str:
+    text = _environment().get_template(template).render(**values)
     # Blocks that say nothing leave their blank lines; what is quoted never spans lines.
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
+
+
+def _placed(text: str, images: tuple[ImagePart, ...]) -> tuple[str | ImagePart, ...]:
+    """Returns the text cut at its sentinels, with the pictures between."""
+    pieces = re.split(f"{_SENTINEL}(\\d+){_SENTINEL}\n", text)
+    parts = [images[int(piece)] if i % 2 else piece for i, piece in enumerate(pieces)]
+    return tuple(part for part in parts if part)
 
 
 @functools.lru_cache(maxsize=1)
@@ -89,13 +117,30 @@ def _environment() -> jinja2.Environment:
         # Plain text for a model: HTML escapes would only garble it.
         autoescape=False,
     )
-    environment.filters.update(quote=_quote, metres=_metres, bearing=_bearing)
+    environment.filters.update(
+        quote=_quote, line=_line, picture=_picture, metres=_metres, bearing=_bearing
+    )
     return environment
 
 
-def _quote(text: str) -> str:
-    """Returns the text on one line as a JSON string."""
-    return json.dumps(" ".join(text.split()), ensure_ascii=False)
+_SENTINEL = "\x1f"
+"""Stands around a picture's place in the rendered text; no quoted text can hold it."""
+
+
+def _quote(text: str, limit: int = 400) -> str:
+    """Returns the text on one line as a JSON string; what is over the limit is cut off."""
+    line = _line(text)
+    return json.dumps(line if len(line) <= limit else line[: limit - 1] + "…", ensure_ascii=False)
+
+
+def _line(text: str) -> str:
+    """Returns the text on one line, without control characters and lone surrogates."""
+    # Categories C*: controls, invisible formats, surrogates and private or unassigned ones.
+    return " ".join("".join(c if c.isprintable() or c.isspace() else " " for c in text).split())
+
+
+def _picture(place: Place) -> str:
+    return f"{_SENTINEL}{place.index}{_SENTINEL}"
 
 
 def _metres(distance: float) -> str:

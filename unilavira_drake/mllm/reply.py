@@ -44,7 +44,7 @@ class Attempt(Message):
     model: str = ""
     """The model that was asked, as its provider calls it."""
     status: str = "ok"
-    """``ok``, ``cancelled`` or the name of the error."""
+    """``ok``, ``replayed`` (by a cassette), ``cancelled`` or the name of the error."""
     http_status: int | None = None
     """None when no answer came, and for models without HTTP."""
     usage: Usage = Usage()

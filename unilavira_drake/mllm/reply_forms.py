@@ -10,14 +10,14 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 
-from unilavira_drake.mllm.reply_model import ReplyModel
+from unilavira_drake.mllm.reply_model import Number, ReplyModel, Share, Whole
 
 
 class UpdateOp(ReplyModel):
     """Closes an item with its evidence, or opens it again."""
 
     op: Literal["update"]
-    index: int
+    index: Whole
     status: Literal["completed", "pending"]
     # May be missing: the TODO memory then rolls the completion back and says so.
     result: str = ""
@@ -27,7 +27,7 @@ class RewriteOp(ReplyModel):
     """Words a pending item better."""
 
     op: Literal["rewrite"]
-    index: int
+    index: Whole
     content: str
 
 
@@ -36,14 +36,14 @@ class AddOp(ReplyModel):
 
     op: Literal["add"]
     content: str
-    index: int | None = None
+    index: Whole | None = None
 
 
 class RemoveOp(ReplyModel):
     """Drops an item."""
 
     op: Literal["remove"]
-    index: int
+    index: Whole
 
 
 class Turn(ReplyModel):
@@ -57,7 +57,7 @@ class Backtrack(ReplyModel):
     """Drive back to a waypoint (paper III-D)."""
 
     tool: Literal["backtrack"]
-    waypoint: int
+    waypoint: Whole
 
 
 class GoStair(ReplyModel):
@@ -120,9 +120,9 @@ class GroundReply(ReplyModel):
     """Reply to ``ground``: a box, or a point when a box is ill-defined, or neither and why."""
 
     target_desc: str
-    box: Annotated[list[float], pydantic.Field(min_length=4, max_length=4)] | None
-    point: Annotated[list[float], pydantic.Field(min_length=2, max_length=2)] | None
-    confidence: Annotated[float, pydantic.Field(ge=0.0, le=1.0)] | None
+    box: Annotated[list[Number], pydantic.Field(min_length=4, max_length=4)] | None
+    point: Annotated[list[Number], pydantic.Field(min_length=2, max_length=2)] | None
+    confidence: Share | None
     reason: str
 
 

@@ -41,6 +41,8 @@ class WaypointNote(Message):
     """One text a direction tried from there, e.g. ``left: arrived at waypoint 3``."""
     offered: bool = False
     """Whether ``backtrack`` may name it."""
+    picture: str = ""
+    """Name of the picture of its front view, e.g. ``H3``; empty when no picture shows it."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,8 @@ class LanguageVariables(Message):
     failed_edges: tuple[str, ...] = ()
     failed_direction: str = ""
     """On ``recover``: the direction that failed from here."""
+    failed_pictures: tuple[str, ...] = ()
+    """On ``recover``: names of the pictures of the way that failed, e.g. ``H5``."""
     can_climb: bool = False
 
 

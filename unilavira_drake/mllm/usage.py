@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from unilavira_drake.messages import Message
-from unilavira_drake.mllm.reply import Usage
+from unilavira_drake.mllm.reply import Attempt, MllmReply, Usage
 
 
 @dataclass(frozen=True)
@@ -16,5 +17,46 @@ class ModelUsage(Message):
     """Requests answered, by a reply or by an error."""
     errors: int = 0
     """How many of them by an error."""
+    attempts: int = 0
+    """Requests on the wire, retries included."""
     total: Usage = Usage(cost_usd=0.0)
     """Sum over the replies; the cost is unknown as soon as one reply's cost is."""
+    spent_usd: float = 0.0
+    """US dollars over the replies whose cost is known."""
+    seconds: float = 0.0
+    """That the model took, wall-clock or as recorded; no part of a transcript."""
+    failure: str = ""
+    """The first error that was not the model's own; empty while the model can be reached."""
+
+    def __add__(self, other: ModelUsage) -> ModelUsage:
+        return ModelUsage(
+            self.calls + other.calls,
+            self.errors + other.errors,
+            self.attempts + other.attempts,
+            self.total + other.total,
+            self.spent_usd + other.spent_usd,
+            self.seconds + other.seconds,
+            self.failure or other.failure,
+        )
+
+    @property
+    def tokens(self) -> int:
+        """Tokens in and out."""
+        return self.total.input_tokens + self.total.output_tokens
+
+    def after(self, reply: MllmReply, *, attempts: int, seconds: float) -> ModelUsage:
+        """Returns the totals with one more reply, its attempts and the seconds that it took."""
+        return self + ModelUsage(
+            calls=1,
+            errors=int(bool(reply.error)),
+            attempts=attempts,
+            total=reply.usage,
+            spent_usd=reply.usage.cost_usd or 0.0,
+            seconds=seconds,
+            failure=reply.error if reply.infrastructure else "",
+        )
+
+
+def paid(attempts: Iterable[Attempt]) -> Usage:
+    """Returns what attempts cost together, e.g. those of a call that brought no reply."""
+    return sum((attempt.usage for attempt in attempts), Usage(cost_usd=0.0))

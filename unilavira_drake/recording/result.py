@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from unilavira_drake.errors import InputError
-from unilavira_drake.mllm.reply import Usage
+from unilavira_drake.mllm.usage import ModelUsage
 
 RESULT_SCHEMA_VERSION = 1
 
@@ -72,6 +72,31 @@ class CountsResult:
 
 
 @dataclass(frozen=True)
+class UsageResult:
+    """What both models have cost; a cassette's replies cost what they did when recorded."""
+
+    input_tokens: int = 0
+    output_tokens: int = 0
+    """Reasoning included."""
+    images: int = 0
+    cost_usd: float | None = None
+    """None as soon as the price of one reply is not known."""
+    cached_tokens: int = 0
+    """How many of ``input_tokens`` came out of the provider's cache."""
+    reasoning_tokens: int = 0
+    """How many of ``output_tokens`` were hidden reasoning."""
+    attempts: int = 0
+    """Requests on the wire: the rows of the ledger, calls that were given up left out."""
+    errors: int = 0
+    """Calls that brought an error instead of a reply."""
+
+    @staticmethod
+    def of(usage: ModelUsage) -> UsageResult:
+        """Returns the totals of both models."""
+        return UsageResult(**asdict(usage.total), attempts=usage.attempts, errors=usage.errors)
+
+
+@dataclass(frozen=True)
 class TimeResult:
     """Simulated time; wall and CPU times stand in ``timings.json``."""
 
@@ -87,6 +112,8 @@ class EpisodeResult:
     success: bool | None = None
     cause: str = ""
     """Why the episode ended; a key of ``messages.metrics.CAUSES``."""
+    error: str = ""
+    """With the cause ``model_unreachable``: the named error."""
     task: TaskResult = TaskResult()
     scenario: str = ""
     robot: str = ""
@@ -95,7 +122,7 @@ class EpisodeResult:
     model: ModelResult = ModelResult()
     metrics: MetricsResult = MetricsResult()
     counts: CountsResult = CountsResult()
-    usage: Usage = Usage()
+    usage: UsageResult = UsageResult()
     time: TimeResult = TimeResult()
     versions: dict[str, str] = field(default_factory=dict)
 
@@ -109,7 +136,7 @@ _PARTS = {
     "model": ModelResult,
     "metrics": MetricsResult,
     "counts": CountsResult,
-    "usage": Usage,
+    "usage": UsageResult,
     "time": TimeResult,
 }
 

@@ -8,6 +8,9 @@ from types import TracebackType
 from typing import Any
 
 from unilavira_drake.errors import InputError
+from unilavira_drake.mllm.ledger import LEDGER, Ledger
+from unilavira_drake.mllm.reply import Attempt
+from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.recording.occupancy_picture import PNG_MAGIC
 from unilavira_drake.recording.transcript import transcript_line
 
@@ -17,7 +20,7 @@ MAPS = "maps"
 
 
 class RunFolder:
-    """Writes the files of a run; as a context manager it closes the transcript, come what may.
+    """Writes the files of a run; as a context manager it closes them, come what may.
 
     Args:
         path: the folder itself; made if need be.
@@ -30,7 +33,11 @@ class RunFolder:
         self.path = Path(path)
         _prepare(self.path)
         self._partial = self.path / f"{TRANSCRIPT}.partial"
-        self._stream = self._partial.open("w", encoding="utf-8", newline="\n")
+        # Half a surrogate pair in a reply has no UTF-8; its escape is JSON, too.
+        self._stream = self._partial.open(
+            "w", encoding="utf-8", errors="backslashreplace", newline="\n"
+        )
+        self._ledger = Ledger(self.path / LEDGER)
         self._pictures: set[str] = set()
         self._decision = 0
 
@@ -44,7 +51,7 @@ class RunFolder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Closes the transcript, also after an error or an interrupt."""
+        """Closes the files, also after an error or an interrupt."""
         self.close()
 
     def record(self, t: float, system: str, event: str, message: Any) -> None:
@@ -65,6 +72,10 @@ class RunFolder:
         self._stream.write(line + "\n")
         self._stream.flush()
 
+    def record_attempt(self, request: MllmRequest, tries: int, attempt: Attempt) -> None:
+        """Appends how a try (a number from 1) at a model call went; from any thread."""
+        self._ledger.record(request, tries, attempt)
+
     def write(self, name: str, content: str | bytes) -> Path:
         """Writes a file in one step and returns its path; it replaces an older one."""
         path = self.path / name
@@ -75,7 +86,8 @@ class RunFolder:
         return path
 
     def close(self) -> None:
-        """Gives the transcript its name; a second call does nothing."""
+        """Closes the ledger and gives the transcript its name; a second call does nothing."""
+        self._ledger.close()
         if not self._stream.closed:
             self._stream.close()
             os.replace(self._partial, self.path / TRANSCRIPT)

@@ -5,21 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from unilavira_drake.messages import LanguageAction, VisionAction
-from unilavira_drake.mllm.reply import MllmReply, Usage
 from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.recording.result import CountsResult
 
 
 class Tally:
-    """A listener that counts calls, re-asks, fallbacks and backtracks, and sums their cost."""
+    """A listener that counts calls, re-asks, fallbacks and backtracks."""
 
     def __init__(self) -> None:
         self._calls = {"language": 0, "vision": 0}
         self._reasks = 0
         self._fallbacks = 0
         self._backtracks = 0
-        self.usage = Usage(cost_usd=0.0)
-        """Sum over all replies."""
         self.answer = ""
         """The agent's answer to a question; empty without one."""
 
@@ -28,8 +25,6 @@ class Tally:
         if isinstance(message, MllmRequest):
             self._calls[message.role] += 1
             self._reasks += message.attempt > 0
-        elif isinstance(message, MllmReply):
-            self.usage += message.usage
         elif isinstance(message, LanguageAction | VisionAction):
             self._fallbacks += message.fallback
             if isinstance(message, LanguageAction):

@@ -77,8 +77,10 @@ def _goal(
 
 
 def _described(scenario: Scenario) -> tuple[str, ...]:
-    language = make_backend(scenario.language_model, place="language_model").description
-    vision = make_backend(scenario.vision_model, place="vision_model").description
+    language = make_backend(
+        scenario.language_model, role="language", place="language_model"
+    ).description
+    vision = make_backend(scenario.vision_model, role="vision", place="vision_model").description
     if language == vision:
         return (f"Both models: {language}.",)
     return (f"Language model: {language}.", f"Vision model: {vision}.")

@@ -25,6 +25,7 @@ from unilavira_drake.tasks import TaskSpec
 from unilavira_drake.vision.reply import parse_vision_reply
 
 MAX_REASKS = 1
+"""A reply that cannot be used is asked for once more, with what was wrong; a refusal is not."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ class Vision(Level):
         period: polling period, seconds.
         seed: the episode's seed, part of every request.
         detector: evidence for a model declared ``ground_truth``; None for all others.
+        box_space: how the model writes places in a picture, a key of ``boxes.BOX_SPACES``.
     """
 
     def __init__(
@@ -66,10 +68,12 @@ class Vision(Level):
         period: float,
         seed: int,
         detector: Callable[[Frame], ViewEvidence] | None = None,
+        box_space: str = "pixels",
     ) -> None:
         super().__init__(VisionState(), period=period)
         self._seed = seed
         self._detector = detector
+        self._box_space = box_space
         self._task = message_input(self, "task", TaskSpec())
         self._language_action = message_input(self, "language_action", LanguageAction())
         self._panorama = message_input(self, "panorama", Panorama())
@@ -84,6 +88,9 @@ class Vision(Level):
             return self._ask(context, state)
         reply = self._reply(context)
         if (reply.n, reply.attempt) != (state.request.n, state.request.attempt):
+            return state
+        if reply.infrastructure:
+            # The monitor ends the episode; nothing is to be decided in the agent's name.
             return state
         return self._conclude(state, reply)
 
@@ -112,8 +119,9 @@ class Vision(Level):
                 todo=None if todo is None else todo.items,
                 width=frame.intrinsics.width,
                 height=frame.intrinsics.height,
+                box_space=self._box_space,
             ),
-            images=(ImagePart(f"view {direction}", frame.jpeg),),
+            images=(ImagePart(f"view {direction}", frame.jpeg, "high"),),
             evidence=None if self._detector is None else (self._detector(frame),),
         )
         return dataclasses.replace(state, request=request)

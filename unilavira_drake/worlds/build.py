@@ -11,7 +11,7 @@ from unilavira_drake.worlds.furniture import CATEGORIES, furniture_boxes
 from unilavira_drake.worlds.furniture_library import furniture_model
 from unilavira_drake.worlds.materials import FLOORS, WALLS
 from unilavira_drake.worlds.palette import PALETTE
-from unilavira_drake.worlds.panels import PATTERNS, panel
+from unilavira_drake.worlds.panels import PATTERNS, SIGN, panel
 from unilavira_drake.worlds.schema import (
     DoorEntry,
     ObjectEntry,
@@ -19,6 +19,7 @@ from unilavira_drake.worlds.schema import (
     RoomEntry,
     WorldFile,
 )
+from unilavira_drake.worlds.signs import MOST_LETTERS
 from unilavira_drake.worlds.structure import doorway, frame_boxes, walls
 from unilavira_drake.worlds.world import (
     Box,
@@ -236,7 +237,7 @@ def _panel(
 ) -> WorldObject:
     place = f"{place}: panels: {entry.name!r}"
     for key, value, valid in (
-        ("category", entry.category, PATTERNS),
+        ("category", entry.category, (*PATTERNS, SIGN)),
         ("color", entry.color, PALETTE),
         ("room", entry.room, rooms),
     ):
@@ -249,6 +250,11 @@ def _panel(
     if not 0.0 <= entry.height <= entries.wall_height - height * (entry.category != "rug"):
         raise ScenarioError(
             f"{place}: height: {entry.height} does not fit under {entries.wall_height} m."
+        )
+    if bool(entry.text.strip()) != (entry.category == SIGN) or len(entry.text) > MOST_LETTERS:
+        raise ScenarioError(
+            f"{place}: text: {entry.text!r}; a sign says something in at most {MOST_LETTERS} "
+            "letters, and no other panel has a text."
         )
     room = rooms[entry.room]
     visual = panel(entry, room, (x, y), (width, height), entries.wall_thickness)

@@ -1,4 +1,4 @@
-"""Flat things with a picture on them: windows, paintings, mirrors, whiteboards and rugs."""
+"""Flat things with a picture on them: windows, paintings, mirrors, whiteboards, signs and rugs."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from unilavira_drake.worlds.gltf import TexturedQuads
 from unilavira_drake.worlds.palette import PALETTE
 from unilavira_drake.worlds.schema import PanelEntry
+from unilavira_drake.worlds.signs import sign_picture
 from unilavira_drake.worlds.world import Box, Panel, Room
 
 DEPTH = 0.04
@@ -21,6 +22,8 @@ PILE = 0.012
 """Thickness of a rug, metres."""
 DETAIL = 160.0
 """Pixels a metre of the picture."""
+SIGN_DETAIL = 320.0
+"""The same of a sign: its words are read from across a room."""
 
 Picture = NDArray[np.float32]
 
@@ -50,7 +53,7 @@ def panel(
     )
     _, middle, facing = min(walls, key=lambda wall: wall[0])
     box = Box((*middle, entry.height + height / 2), (DEPTH, width, height), facing)
-    return Panel(entry.category, entry.color, box, facing, seed)
+    return Panel(entry.category, entry.color, box, facing, seed, entry.text)
 
 
 def panel_quads(thing: Panel) -> list[TexturedQuads]:
@@ -66,10 +69,13 @@ def panel_quads(thing: Panel) -> list[TexturedQuads]:
     else:
         size = (box.size[1], box.size[2])
         face = [middle + length + a * width + b * up for a, b in _LOOP]
-    columns, rows = (max(16, round(side * DETAIL)) for side in size)
-    image = PATTERNS[thing.pattern](
-        np.random.default_rng(thing.seed), rows, columns, np.array(PALETTE[thing.color], np.float32)
-    )
+    detail = SIGN_DETAIL if thing.text else DETAIL
+    columns, rows = (max(16, round(side * detail)) for side in size)
+    color = np.array(PALETTE[thing.color], np.float32)
+    if thing.text:
+        image = sign_picture(thing.text, rows, columns, color)
+    else:
+        image = PATTERNS[thing.pattern](np.random.default_rng(thing.seed), rows, columns, color)
     uv = np.array([[(0, 1), (1, 1), (1, 0), (0, 0)]], float)
     front = TexturedQuads(np.array([face]), uv, _bytes(image))
     edge = _bytes(np.broadcast_to(image[0, 0], (4, 4, 3)))
@@ -189,7 +195,9 @@ PATTERNS = {
     "whiteboard": _whiteboard,
     "rug": _rug,
 }
-"""Category -> what is drawn."""
+"""Category -> what is drawn; a ``SIGN`` shows its text instead."""
+
+SIGN = "sign"
 
 
 def _bytes(image: NDArray[Any]) -> NDArray[np.uint8]:

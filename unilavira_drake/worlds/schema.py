@@ -64,7 +64,7 @@ class PanelEntry:
     """Something flat: on the nearest wall of its room, or a rug on the floor."""
 
     name: str = ""
-    # window, picture, mirror, whiteboard or rug.
+    # window, picture, mirror, whiteboard, sign or rug.
     category: str = ""
     # Colour word that fits what is drawn.
     color: str = ""
@@ -75,6 +75,8 @@ class PanelEntry:
     size: list[float] = dc.field(default_factory=list)
     # Lower edge above the floor, metres.
     height: float = 0.9
+    # What a sign says.
+    text: str = ""
 
 
 @dc.dataclass

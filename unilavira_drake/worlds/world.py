@@ -70,7 +70,7 @@ class Placement(Message):
 
 @dataclass(frozen=True)
 class Panel(Message):
-    """A flat thing with a picture on it: a window, a painting, a rug."""
+    """A flat thing with a picture on it: a window, a painting, a sign, a rug."""
 
     pattern: str = "picture"
     color: str = ""
@@ -80,6 +80,8 @@ class Panel(Message):
     facing: float | None = None
     """Yaw of the side that shows the picture, radians; None faces up."""
     seed: int = 0
+    text: str = ""
+    """The words of a sign."""
 
 
 @dataclass(frozen=True)

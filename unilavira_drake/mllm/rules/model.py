@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from unilavira_drake.errors import MllmError
-from unilavira_drake.mllm.reply import Completion
+from unilavira_drake.mllm.reply import Completion, Usage
 from unilavira_drake.mllm.request import MllmRequest, VisionVariables
 from unilavira_drake.mllm.rules.check import answer, double_check
 from unilavira_drake.mllm.rules.decide import decide
@@ -46,7 +46,7 @@ class RulesModel:
             reply = ground(request.variables, request.evidence)
         else:
             reply = _language_reply(request)
-        return Completion(text=json.dumps(reply, ensure_ascii=False))
+        return Completion(json.dumps(reply, ensure_ascii=False), Usage(cost_usd=0.0))
 
     def close(self) -> None:
         """Does nothing: there are no connections."""

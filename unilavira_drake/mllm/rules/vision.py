@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from unilavira_drake.mllm.boxes import BOX_SPACES
 from unilavira_drake.mllm.evidence import Detection, ViewEvidence
 from unilavira_drake.mllm.request import VisionVariables
 from unilavira_drake.mllm.rules.floor_camera import FloorCamera
@@ -33,7 +34,21 @@ _INSIDE_HUB = 0.8
 
 
 def ground(variables: VisionVariables, evidence: Sequence[ViewEvidence]) -> dict[str, Any]:
-    """Returns the reply to ``ground``: a box, or a point on the floor, or why there is neither."""
+    """Returns the reply to ``ground``: a box, or a point on the floor, or why there is neither.
+
+    It is written in the request's box space, as every model's reply is.
+    """
+    reply = _selection(variables, evidence)
+    space, size = BOX_SPACES[variables.box_space], (variables.width, variables.height)
+    if reply["box"] is not None:
+        reply["box"] = space.from_pixels_box(reply["box"], *size)
+    if reply["point"] is not None:
+        reply["point"] = space.from_pixels_point(reply["point"], *size)
+    return reply
+
+
+def _selection(variables: VisionVariables, evidence: Sequence[ViewEvidence]) -> dict[str, Any]:
+    """Returns the same in pixels of the view."""
     view = next((v for v in evidence if v.direction == variables.direction), None)
     if view is None:
         return _nothing("there is no evidence for this view")

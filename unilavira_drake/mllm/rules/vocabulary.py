@@ -96,6 +96,7 @@ THINGS: dict[str, tuple[str, ...]] = {
     "teddy bear": ("toy", "soft toy"),
     "bean bag": ("beanbag",),
     "whiteboard": ("white board",),
+    "sign": ("notice",),
     "water cooler": ("water dispenser",),
     "punching bag": ("punch bag", "boxing bag", "sandbag"),
     "exercise bench": ("weight bench", "workout bench"),

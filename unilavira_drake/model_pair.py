@@ -1,0 +1,86 @@
+"""The two models of an episode, and what keeps their calls."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+from types import TracebackType
+
+from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.mllm.broker import AttemptListener, Broker
+from unilavira_drake.mllm.cassette import CassetteHeader
+from unilavira_drake.mllm.cassette_file import CassetteWriter
+from unilavira_drake.mllm.replay import RecordingModel, answered_by, declared
+from unilavira_drake.mllm.reply import Mllm
+from unilavira_drake.scenario import Scenario
+from unilavira_drake.task_choice import choose_task
+
+
+class ModelPair:
+    """The brokers of the language and the vision model; as a context manager it closes both.
+
+    Args:
+        language: for the role ``language``.
+        vision: for the role ``vision``.
+    """
+
+    def __init__(self, language: Broker, vision: Broker) -> None:
+        self.language = language
+        self.vision = vision
+
+    def __enter__(self) -> ModelPair:
+        """Returns itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Closes both, also after an error or an interrupt."""
+        self.close()
+
+    def close(self) -> None:
+        """Gives up the calls under way; replies that have come stay readable."""
+        self.language.close()
+        self.vision.close()
+
+
+def make_models(scenario: Scenario, *, on_attempt: AttemptListener | None = None) -> ModelPair:
+    """Returns the models that a scenario names; with ``record`` their replies are kept.
+
+    Args:
+        scenario: what is run.
+        on_attempt: called after each attempt of each call, from other threads; see ``Broker``.
+
+    Raises:
+        InputError: if a model cannot be made, or the cassette cannot be written.
+        CassetteError: if the cassette to continue is broken.
+    """
+    language = make_backend(scenario.language_model, role="language", place="language_model")
+    vision = make_backend(scenario.vision_model, role="vision", place="vision_model")
+    if scenario.record:
+        cassette = CassetteWriter(
+            Path(scenario.record).expanduser(),
+            header=_header(scenario, language, vision),
+            mode=scenario.record_mode,
+        )
+        language = RecordingModel(language, cassette)
+        vision = RecordingModel(vision, cassette)
+    return ModelPair(Broker(language, on_attempt=on_attempt), Broker(vision, on_attempt=on_attempt))
+
+
+def _header(scenario: Scenario, language: Mllm, vision: Mllm) -> CassetteHeader:
+    who = dict.fromkeys((answered_by(language), answered_by(vision)))
+    return CassetteHeader(
+        answered_by=" and ".join(who),
+        date=datetime.date.today().isoformat(),
+        preset=scenario.prompt_preset,
+        scenario=scenario.name,
+        task=choose_task(scenario).spec.text,
+        ablation=scenario.ablation,
+        seed=scenario.random_seed,
+        language=declared(language),
+        vision=declared(vision),
+    )
