@@ -14,6 +14,7 @@ and 3.1 ms for a plain one, at 640x480 on two cores without a GPU.
 from __future__ import annotations
 
 import argparse
+import functools
 import importlib
 import json
 import math
@@ -41,7 +42,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 from scenes import ROOM, add_shapes
 
@@ -53,6 +54,10 @@ IMAGES = ("color_image", "depth_image_32f", "label_image")
 DEPTH = IMAGES[1:2]
 
 
+class Bystander(LeafSystem):
+    """Does nothing."""
+
+
 class Bench:
     """A scene with one or both cameras on a body that is moved.
 
@@ -60,7 +65,7 @@ class Bench:
         world: name or file; empty for one of every primitive shape.
         size: width and height, pixels.
         views: how many, all around.
-        cameras: ``raster``, ``vtk`` or both.
+        cameras: of ``raster``, ``vtk`` and ``bystander``, an empty System written in Python.
     """
 
     def __init__(
@@ -72,9 +77,8 @@ class Bench:
     ) -> None:
         builder = DiagramBuilder()
         self.plant, graph = AddMultibodyPlantSceneGraph(builder, 0.01)
-        self.body = self.plant.AddRigidBody(
-            "C", SpatialInertia(1.0, [0, 0, 0], UnitInertia(1, 1, 1))
-        )
+        origin: Any = np.zeros(3)
+        self.body = self.plant.AddRigidBody("C", SpatialInertia(1.0, origin, UnitInertia(1, 1, 1)))
         self.world = load_world(world) if world else None
         textured = False
         if self.world is not None:
@@ -94,10 +98,12 @@ class Bench:
         depth = DepthRange(0.1, 10.0)
         names = [f"view_{index}" for index in range(views)]
         X_BC = [
-            RigidTransform(RollPitchYaw(0, 2 * math.pi * i / views, 0), [0, 0, 0])
+            RigidTransform(RollPitchYaw(0, 2 * math.pi * i / views, 0), origin)
             for i in range(views)
         ]
         self.ports: dict[str, list[tuple[Any, str]]] = {"raster": [], "vtk": []}
+        if "bystander" in cameras:
+            builder.AddSystem(Bystander())
         if "raster" in cameras:
             rig = tuple(
                 RasterView(frame, X, core, depth, name) for X, name in zip(X_BC, names, strict=True)
@@ -110,7 +116,7 @@ class Bench:
             parameters = RenderEngineVtkParams(backend="EGL", lights=lights(textured=textured))
             graph.AddRenderer("vtk", MakeRenderEngineVtk(parameters))
             for X in X_BC:
-                sensor = builder.AddSystem(
+                sensor: Any = builder.AddSystem(
                     RgbdSensor(frame, X, ColorRenderCamera(core), DepthRenderCamera(core, depth))
                 )
                 builder.Connect(graph.get_query_output_port(), sensor.query_object_input_port())
@@ -128,11 +134,7 @@ class Bench:
                 rooms = self.world.rooms
                 x_min, y_min, x_max, y_max = rooms[rng.integers(len(rooms))].rectangle
             R = RollPitchYaw(0, rng.uniform(-0.2, 0.3), rng.uniform(-math.pi, math.pi))
-            p = [
-                rng.uniform(x_min + 0.3, x_max - 0.3),
-                rng.uniform(y_min + 0.3, y_max - 0.3),
-                rng.uniform(0.5, 1.6),
-            ]
+            p: Any = rng.uniform((x_min + 0.3, y_min + 0.3, 0.5), (x_max - 0.3, y_max - 0.3, 1.6))
             yield RigidTransform(R.ToRotationMatrix().multiply(turn), p)
 
     def look(self, X: RigidTransform) -> None:
@@ -147,7 +149,7 @@ class Bench:
             system.GetOutputPort(prefix + image)
             .Eval(system.GetMyContextFromRoot(self.context))
             .data
-            for system, prefix in self.ports[camera]
+            for system, prefix in self.ports.get(camera, ())
             for image in images
         ]
 
@@ -157,7 +159,7 @@ class Bench:
         for index, X in enumerate(self.poses(count + 3, 7)):
             self.look(X)
             for camera in ("raster", "vtk") if index % 2 else ("vtk", "raster"):
-                took = cpu_ms(lambda name=camera: self.pull(name, images))
+                took = cpu_ms(functools.partial(self.pull, camera, images))
                 if index >= 3:
                     spent[camera].append(took)
         return spent["raster"], spent["vtk"]
@@ -221,9 +223,9 @@ def child(world: str, camera: str, frames: int) -> None:
     print(json.dumps({"first_s": first, "wall_s": wall, "cpu_s": cpu}))
 
 
-def children(world: str, camera: str, frames: int, processes: int) -> list[dict[str, float]]:
+def children(world: str, task: list[str], processes: int) -> list[dict[str, float]]:
     """Runs children at the same time; each draws in its one thread."""
-    command = [sys.executable, __file__, "--world", world, "--child", camera, str(frames)]
+    command = [sys.executable, __file__, "--world", world, *task]
     running = [
         subprocess.Popen(
             command, stdout=subprocess.PIPE, text=True, env={**os.environ, "LP_NUM_THREADS": "0"}
@@ -237,7 +239,9 @@ def children(world: str, camera: str, frames: int, processes: int) -> list[dict[
 def building(world: str) -> None:
     """Prints the cost of a new scene, of a view and of a clone, and how processes scale."""
     firsts = {
-        camera: statistics.median(children(world, camera, 1, 1)[0]["first_s"] for _ in range(3))
+        camera: statistics.median(
+            children(world, ["--child", camera, "1"], 1)[0]["first_s"] for _ in range(3)
+        )
         for camera in ("raster", "vtk")
     }
     row(
@@ -264,8 +268,9 @@ def building(world: str) -> None:
         target=10.0,
         sense="<=",
     )
-    alone = [children(world, "raster", 150, 1)[0] for _ in range(2)]
-    both = [children(world, "raster", 150, 2) for _ in range(2)]
+    task = ["--child", "raster", "150"]
+    alone = [children(world, task, 1)[0] for _ in range(2)]
+    both = [children(world, task, 2) for _ in range(2)]
     row(
         "R4.scale",
         "frames a second of two processes with one GL thread each, over those of one",
@@ -319,35 +324,36 @@ def clones(world: str) -> None:
         bench.pull("raster")
 
 
+def builds(world: str, camera: str, count: int) -> None:
+    """Builds a scene again and again, and prints what each build leaves behind, megabytes."""
+    for number in (10, count):
+        before = resident_mb()
+        for _ in range(number):
+            Bench(world, (320, 240), cameras=(camera,)).pull(camera)
+    print(json.dumps({"mb": (resident_mb() - before) / count}))
+
+
 def leaks(world: str) -> None:
     """Prints what 10,000 frames and 200 builds leave behind."""
     bench = Bench(world, (320, 240), cameras=("raster",))
     poses = list(bench.poses(100, 5))
-    for X in poses:
-        bench.look(X)
-        bench.pull("raster")
-    before = resident_mb()
-    for _ in range(100):
-        for X in poses:
+    # What is made once, such as a shader for a kind of picture, is made in the first round.
+    for rounds in (1, 100):
+        before = resident_mb()
+        for X in poses * rounds:
             bench.look(X)
             bench.pull("raster")
     row("leak.frames", "memory after 10,000 frames more", resident_mb() - before, "MB")
-    grown = {}
-    for cameras in ((), ("raster",)):
-        for _ in range(10):
-            Bench(world, cameras=cameras)
-        before = resident_mb()
-        for _ in range(200):
-            built = Bench(world, cameras=cameras)
-            if cameras:
-                built.pull("raster")
-        grown[cameras] = resident_mb() - before
+    each = {
+        camera: children(world, ["--builds", camera, "200"], 1)[0]["mb"]
+        for camera in ("none", "bystander", "raster")
+    }
     row(
         "leak.builds",
-        "memory of each of 200 builds more, beyond that of the scene without a camera",
-        (grown[("raster",)] - grown[()]) / 200,
+        "memory of each of 200 builds more, beyond that of a diagram with an empty Python System",
+        each["raster"] - each["bystander"],
         "MB",
-        without_camera_mb=round(grown[()] / 200, 3),
+        **{f"{camera}_mb": round(value, 3) for camera, value in each.items()},
     )
 
 
@@ -358,10 +364,14 @@ def main() -> None:
     parser.add_argument("--poses", type=int, default=200, help="poses to compare pictures at")
     parser.add_argument("--leaks", action="store_true", help="10,000 frames and 200 builds, too")
     parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
+    parser.add_argument("--builds", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     world = arguments.world
     if arguments.child:
         child(world, arguments.child[0], int(arguments.child[1]))
+        return
+    if arguments.builds:
+        builds(world, arguments.builds[0], int(arguments.builds[1]))
         return
     with tempfile.TemporaryDirectory() as folder:
         room = Path(folder) / "room.yaml"

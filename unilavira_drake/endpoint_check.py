@@ -133,13 +133,14 @@ def _mark(profile: Profile) -> _Call:
     backend = RemoteModel(profile, role="vision")
     try:
         reply = backend.complete(request)
-        form, _ = GroundReply.read(reply.text)
-    except MllmError as error:
-        return _Call(request, error, tuple(error.attempts), ())
-    except ReplyFormatError as error:
+    except (MllmError, ReplyFormatError) as error:
         return _Call(request, error, tuple(error.attempts), ())
     finally:
         backend.close()
+    try:
+        form, _ = GroundReply.read(reply.text)
+    except ReplyFormatError as error:
+        return _Call(request, error, reply.attempts, (reply,))
     return _Call(request, None, reply.attempts, (reply,), form)
 
 
@@ -192,7 +193,7 @@ def _structured(plan: _Call, profile: Profile) -> Check:
 
 def _text_tokens(plan: _Call, profile: Profile) -> Check:
     what = "text tokens"
-    if not plan.replies:
+    if not plan.answered:
         return Check(what=what)
     counted, expected = _counted(plan), _expected_text(plan.request, profile)
     detail = f"{counted} counted, about {expected} expected"
@@ -211,7 +212,7 @@ def _pictures(mark: _Call, plan: _Call, profile: Profile) -> Check:
         own = isinstance(mark.error, MllmRequestError)
         return Check(FAILED, "pictures", str(mark.error), remedy if own else "")
     counted, before = _counted(mark), _counted(plan)
-    if not (counted and before and mark.replies):
+    if not (counted and before):
         return Check(OK, "pictures", "accepted")
     text = _expected_text(mark.request, profile) * before / _expected_text(plan.request, profile)
     tokens = max(round(counted - text), 0)
@@ -220,7 +221,7 @@ def _pictures(mark: _Call, plan: _Call, profile: Profile) -> Check:
     if _plausible(tokens, expected):
         return Check(OK, "pictures", detail)
     remedy = "set image_tokens, by which rate limits plan; near 0, the server leaves pictures out"
-    return Check(UNKNOWN, "pictures", f"{detail}, {expected} by the profile", remedy)
+    return Check(UNKNOWN, "pictures", f"{detail}, about {expected} expected", remedy)
 
 
 def _box(mark: _Call, profile: Profile) -> Check:
@@ -269,10 +270,9 @@ def _cost(calls: list[_Call], profile: Profile) -> Check:
 
 
 def _counted(call: _Call) -> int:
-    """Input tokens of the first reply, by the server's count."""
-    replies = call.replies or (Completion(),)
-    counts = [attempt.usage.input_tokens for attempt in replies[0].attempts]
-    return max(counts, default=0)
+    """Input tokens of the first request that was counted; later ones also hold a complaint."""
+    counts = (attempt.usage.input_tokens for attempt in call.attempts)
+    return next((count for count in counts if count), 0)
 
 
 def _expected_text(request: MllmRequest, profile: Profile) -> int:

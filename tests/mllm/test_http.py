@@ -90,7 +90,7 @@ def test_the_deadline_is_for_everything(server: FaultServer, http: HttpClient) -
     assert 0.2 <= time.monotonic() - begin < 1.0
 
 
-def test_a_resolver_that_hangs_holds_up_neither_the_call_nor_the_exit(
+def test_a_resolver_that_hangs_does_not_hold_up_the_call(
     http: HttpClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     freed = threading.Event()
@@ -108,10 +108,12 @@ def test_closing_breaks_off_what_is_under_way(server: FaultServer, http: HttpCli
     exchange = http.submit("POST", base_url + PATH, headers={}, body=b"{}")
     while not server.visit(base_url).posts:
         time.sleep(0.01)
+    thread = http._thread
+    assert thread is not None
     http.close()
     assert exchange.cancelled()
     assert server.visit(base_url).left.wait(2.0)
-    assert not [thread for thread in threading.enumerate() if thread.name == "mllm-http"]
+    assert not thread.is_alive()
     with pytest.raises(MllmError, match="closed"):
         http.post(base_url + PATH, headers={}, body=b"{}")
     http.close()

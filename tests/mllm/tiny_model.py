@@ -38,7 +38,7 @@ DECIDE = MllmRequest(
 
 
 def profile_of(
-    dialect: str, base_url: str, *, deadline: float = 1.0, attempt: float = 0.3, **changes: Any
+    dialect: str, base_url: str, *, deadline: float = 5.0, attempt: float = 5.0, **changes: Any
 ) -> Profile:
     settings = RoleSettings(deadline=deadline, attempt_deadline=attempt, max_output_tokens=500)
     known: dict[str, Any] = {

@@ -3,7 +3,7 @@ import gc
 import cv2
 import numpy as np
 import pytest
-from pydrake.geometry import Box, RenderLabel, Sphere
+from pydrake.geometry import Box, ProximityProperties, RenderLabel, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.sensors import ImageDepth16U, ImageDepth32F, ImageLabel16I, ImageRgba8U
 from two_cameras import TwoCameras, edited, instance, pose, quad, shapes, wall
@@ -136,6 +136,23 @@ def test_geometry_comes_and_goes_with_the_context():
     graph.RemoveGeometry(graph_context, cameras.source, id_)
     for old, new in zip(before, cameras.ours(context=changed), strict=True):
         np.testing.assert_array_equal(old, new)
+
+
+def test_a_shape_that_changes_under_its_id_is_seen():
+    ball = instance(Sphere(0.5), AHEAD, "ball", label=4)
+    ball.set_proximity_properties(ProximityProperties())
+    cameras = TwoCameras(shapes(wall(), ball), vtk=False)
+    cameras.look(pose(0, 0, 0))
+    before = cameras.ours()
+    changed = cameras.context.Clone()
+    graph = cameras.scene_graph
+    graph.ChangeShape(
+        graph.GetMyMutableContextFromRoot(changed), cameras.source, ball.id(), Box(1.0, 1.0, 1.0)
+    )
+    for old, new in zip(before, cameras.ours(), strict=True):
+        np.testing.assert_array_equal(old, new)
+    label = [cameras.ours("label_image", context=c)[0] for c in (cameras.context, changed)]
+    assert (label[1] == 4).sum() > 1.2 * (label[0] == 4).sum()
 
 
 def test_all_views_of_a_rig_are_the_views_one_by_one():

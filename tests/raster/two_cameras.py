@@ -172,6 +172,7 @@ def quad(width=1.0, height=1.0, image=None):
     uv = np.array([[(0, 1), (1, 1), (1, 0), (0, 0)]], float)
     if image is None:
         image = np.full((4, 4, 3), (200, 100, 50), np.uint8)
+        image[0] = (190, 100, 50)
     return textured_mesh("quad", [TexturedQuads(corners, uv, image)])
 
 

@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 from unilavira_drake.messages.frozen import Message
 
+CAPTION_LENGTH = 160
+TARGET_SHARE = 58
+"""Of a caption's characters the target takes at most these, so that a scene of 100 fits whole."""
+
 
 @dataclass(frozen=True)
 class TodoItem(Message):
@@ -47,8 +51,9 @@ class Waypoint(Message):
     @property
     def caption(self) -> str:
         """Target and scene in one line of at most 160 characters; quoted as data in prompts."""
-        text = "; ".join(part for part in (self.target_desc, self.scene) if part)
-        return text if len(text) <= 160 else text[:159] + "…"
+        target = _clipped(self.target_desc, TARGET_SHARE)
+        text = "; ".join(part for part in (target, self.scene) if part)
+        return _clipped(text, CAPTION_LENGTH)
 
 
 @dataclass(frozen=True)
@@ -142,3 +147,11 @@ class SecondChance(Message):
     failed_frames: tuple[KeyPicture, ...] = ()
     """On arrival after a backtrack: pictures of the failed leg, oldest first; some of them may no
     longer be among the history's key frames."""
+
+
+def _clipped(text: str, limit: int) -> str:
+    """Returns the text, cut after a word, with an ellipsis, to at most ``limit`` characters."""
+    if len(text) <= limit:
+        return text
+    head = text[: limit - 1]
+    return (head.rpartition(" ")[0] or head).rstrip(" ,;") + "…"

@@ -76,18 +76,24 @@ def check_key(text: str, url: str, name: str) -> pydantic.SecretStr:
 
 def redact(text: str, key: pydantic.SecretStr | None) -> str:
     """Returns a text without the key, which a server may have echoed."""
-    secret = key.get_secret_value() if key is not None else ""
-    if len(secret) < _SHORTEST_SECRET:
-        return text
-    for form in {secret, quote(secret, safe="")}:
+    for form in _forms(key):
         text = text.replace(form, "***")
     return text
 
 
 def redact_bytes(body: bytes, key: pydantic.SecretStr | None) -> bytes:
     """Returns a body without the key."""
+    for form in _forms(key):
+        body = body.replace(form.encode(), b"***")
+    return body
+
+
+def _forms(key: pydantic.SecretStr | None) -> list[str]:
+    """How a key may be written: as it is, in an address, and in the JSON of some languages."""
     secret = key.get_secret_value() if key is not None else ""
-    return body if len(secret) < _SHORTEST_SECRET else body.replace(secret.encode(), b"***")
+    if len(secret) < _SHORTEST_SECRET:
+        return []
+    return [secret, quote(secret, safe=""), secret.replace("/", "\\/")]
 
 
 def plain_line(text: str, key: pydantic.SecretStr | None, limit: int = 400) -> str:

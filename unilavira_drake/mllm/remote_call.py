@@ -25,7 +25,7 @@ from unilavira_drake.mllm.address import host_of
 from unilavira_drake.mllm.breaker import Breaker
 from unilavira_drake.mllm.cancellation import Cancellation
 from unilavira_drake.mllm.http import HttpClient, HttpLimits, HttpResponse
-from unilavira_drake.mllm.keys import ROLE_KEYS, SHARED_KEY, plain_line, redact, redact_bytes
+from unilavira_drake.mllm.keys import ROLE_KEYS, SHARED_KEY, plain_line, redact_bytes
 from unilavira_drake.mllm.prices import cost_usd
 from unilavira_drake.mllm.profile import Profile, StructuredMode
 from unilavira_drake.mllm.prompt import compose_prompt
@@ -98,7 +98,8 @@ class RemoteCall:
         except (MllmError, ReplyFormatError) as error:
             error.attempts = tuple(self._attempts)
             raise
-        text = redact(reply.text, self._key).encode("utf-8", "backslashreplace").decode()
+        # Half a surrogate pair could be written into no file; escaped, its reader still objects.
+        text = reply.text.encode("utf-8", "backslashreplace").decode()
         usage = functools.reduce(operator.add, (row.usage for row in self._attempts))
         return Completion(text, usage, self._clock.elapsed, tuple(self._attempts))
 
@@ -138,18 +139,37 @@ class RemoteCall:
 
     def _ask(self, mode: StructuredMode) -> tuple[WireReply | WireFailure, int | None]:
         """One request on the wire; adds a row to the attempts, whatever comes of it."""
-        line, profile = self._line, self._line.profile
-        expected = estimated_tokens(self._prompt, profile)
+        line, model = self._line, self._line.profile.model
+        expected = estimated_tokens(self._prompt, line.profile)
         booking = line.limit.book(expected, within=self._clock.remaining)
         line.cancellation.pause(booking.wait)
         body = line.dialect.body(
             self._prompt,
             self._request,
-            profile,
+            line.profile,
             structured=mode,
             temperature=self._temperature,
             max_output_tokens=self._max_output_tokens,
         )
+        begin = time.monotonic()
+        answer = self._exchange(body)
+        seconds = time.monotonic() - begin
+        status = answer.status if isinstance(answer, HttpResponse) else None
+        outcome = self._read(answer) if isinstance(answer, HttpResponse) else answer
+        outcome = self._with_words(outcome)
+        self._tell_breaker(outcome, status)
+        usage = self._priced(outcome, status)
+        if usage.input_tokens or usage.output_tokens:
+            line.limit.correct(booking, usage.input_tokens + usage.output_tokens)
+        if isinstance(outcome, WireReply):
+            detail = f"answered by {outcome.model}" if outcome.model not in ("", model) else ""
+            self._note("ok", status, usage, seconds, detail)
+        else:
+            self._note(outcome.error.__name__, status, usage, seconds, outcome.message)
+        return outcome, status
+
+    def _exchange(self, body: bytes) -> HttpResponse | WireFailure:
+        line, profile = self._line, self._line.profile
         limits = HttpLimits(
             min(self._settings.attempt_deadline, self._clock.remaining),
             profile.connect_timeout,
@@ -161,37 +181,22 @@ class RemoteCall:
         headers, begin = line.dialect.headers(key), time.monotonic()
         try:
             exchange = line.http.submit("POST", line.url, headers=headers, body=body, limits=limits)
-            answer = line.cancellation.result(exchange)
+            return line.cancellation.result(exchange)
         except BaseException:
             self._note("cancelled", None, Usage(), time.monotonic() - begin, "")
             raise
-        seconds = time.monotonic() - begin
-        status = answer.status if isinstance(answer, HttpResponse) else None
-        outcome = self._read(answer) if isinstance(answer, HttpResponse) else answer
-        outcome = self._with_words(outcome)
-        self._tell_breaker(outcome, status)
-        usage = self._priced(outcome, status)
-        if usage.input_tokens or usage.output_tokens:
-            line.limit.correct(booking, usage.input_tokens + usage.output_tokens)
-        if isinstance(outcome, WireReply):
-            other = outcome.model if outcome.model != profile.model else ""
-            self._note("ok", status, usage, seconds, f"answered by {other}" if other else "")
-        else:
-            self._note(outcome.error.__name__, status, usage, seconds, outcome.message)
-        return outcome, status
 
     def _read(self, answer: HttpResponse) -> WireReply | WireFailure:
         # Before anyone cuts words out of it: half of a key is found by nobody afterwards.
-        headers = {name: redact(value, self._key) for name, value in answer.headers.items()}
         body = redact_bytes(answer.body, self._key)
         if 300 <= answer.status < 400:
-            target = host_of(headers.get("location", "")) or "another path"
+            target = host_of(answer.headers.get("location", "")) or "another path"
             return WireFailure(
                 MllmRequestError,
                 f"HTTP {answer.status}: it redirects to {target}, which is not followed because "
                 "the key would go along; set base_url to the final address.",
             )
-        return self._line.dialect.read(answer.status, headers, parsed(body), body)
+        return self._line.dialect.read(answer.status, answer.headers, parsed(body), body)
 
     def _with_words(self, outcome: WireReply | WireFailure) -> WireReply | WireFailure:
         """A failure's message as a person should read it."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.raster.stage import Stage
-from unilavira_drake.raster.surface import VERTEX, Model, Surface
+from unilavira_drake.raster.surface import Model, Surface
 
 COMMAND = np.dtype(
     [
@@ -64,10 +64,8 @@ class Batch:
                 first_index += surface.triangles.size
                 base_vertex += len(surface.vertices)
         with stage.current() as context:
-            self.vertices = context.buffer(_joined([part.vertices for part in surfaces], VERTEX))
-            self.indices = context.buffer(
-                _joined([part.triangles.ravel() for part in surfaces], np.dtype("<u4"))
-            )
+            self.vertices = context.buffer(_joined([part.vertices for part in surfaces]))
+            self.indices = context.buffer(_joined([part.triangles.ravel() for part in surfaces]))
             self.textures = {
                 surface.texture.key: stage.texture(surface.texture)
                 for surface in surfaces
@@ -114,7 +112,7 @@ def bounds(surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return (low + high) / 2.0, (high - low) / 2.0
 
 
-def _joined(arrays: list[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any]:
+def _joined(arrays: list[NDArray[Any]]) -> NDArray[np.uint8]:
     # OpenGL has no empty buffers.
-    data = np.concatenate(arrays) if arrays else np.zeros(1, dtype)
-    return data.view(np.uint8)
+    nothing = np.zeros(64, np.uint8)
+    return np.concatenate([array.view(np.uint8) for array in arrays]) if arrays else nothing

@@ -68,6 +68,7 @@ def visible(
         axes: (n, 3, 3); the columns are the half edges as vectors.
     """
     distance = centers @ planes[:, :3].T + planes[:, 3]
-    reach = np.abs(planes[:, :3] @ axes).sum(axis=2)
+    edges = axes.transpose(0, 2, 1).reshape(-1, 3)
+    reach = np.abs(edges @ planes[:, :3].T).reshape(-1, 3, len(planes)).sum(axis=1)
     seen: NDArray[np.bool_] = (distance + reach >= 0.0).all(axis=1)
     return seen

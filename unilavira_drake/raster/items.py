@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from unilavira_drake.messages import Message
 from unilavira_drake.raster.batch import COMMAND, Batch, bounds
+from unilavira_drake.raster.culling import Pinhole
 from unilavira_drake.raster.geometry import Drawable
+from unilavira_drake.raster.magnifying import facets_of, magnified
 
-_SCREEN_TRIANGLES = 200
-_SCREEN_HALF_SIZE = 0.5
+_SCREEN_TRIANGLES = 50
+_SCREEN_HALF_SIZE = 1.0
 _FAR = 1e9
 
 
@@ -34,6 +36,8 @@ class Call(Message):
     """A draw call: commands in a row."""
 
     group: Group
+    magnified: bool
+    """Whether the picture's full size is enough."""
     first: int
     count: int
 
@@ -74,6 +78,8 @@ class Items:
         solid = np.array([group.labelled and not group.cutoff for group in colored], dtype=bool)
         self.screens = simple & large & solid
         """Large and simple ones, such as walls: worth drawing first for what they hide."""
+        surfaces = [surface for drawable in drawables for surface in drawable.model.surfaces]
+        self._facets = facets_of({int(i): surfaces[i] for i in np.flatnonzero(simple & large)})
 
     def boxes(self, rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Returns middle (n, 3) and half edges (n, 3, 3) of each surface's box in the world.
@@ -85,8 +91,28 @@ class Items:
         middles = np.einsum("nij,nj->ni", rows[:, :, :3], self._middles) + rows[:, :, 3]
         return middles, rows[:, :, :3] * self._halves[:, None, :]
 
+    def magnified(
+        self,
+        seen: NDArray[np.int64],
+        rows: NDArray[np.float64],
+        X_CW: NDArray[np.float64],
+        pinhole: Pinhole,
+    ) -> NDArray[np.bool_]:
+        """Returns which surfaces are known to be larger in view than their pictures, (n,).
+
+        Args:
+            seen: (k,) surfaces in question.
+            rows: (m, 3, 4) poses of the geometries.
+            X_CW: (4, 4) of the camera.
+            pinhole: its model.
+        """
+        return magnified(self._facets, seen, rows[self.commands["instance"]], X_CW, pinhole)
+
     def in_order(
-        self, seen: NDArray[np.int64], depth: NDArray[np.float64], *, colored: bool
+        self,
+        seen: NDArray[np.int64],
+        depth: NDArray[np.float64],
+        magnified: NDArray[np.bool_] | None,
     ) -> tuple[NDArray[np.int64], list[Call]]:
         """Returns surfaces near to far, those of one picture together, and the calls for them.
 
@@ -95,23 +121,30 @@ class Items:
         Args:
             seen: (k,) the surfaces.
             depth: (k,) of their middles, metres.
-            colored: whether pictures and labels count, beside depth.
+            magnified: (k,) of ``magnified``; without it depth alone is drawn, no pictures and
+                labels.
         """
+        colored = magnified is not None
         groups, group_of = self._groups[colored]
-        if len(groups) == 1:
-            return seen[np.argsort(depth, kind="stable")], [Call(groups[0], 0, len(seen))]
-        group = group_of[seen]
-        nearest = np.full(len(groups), np.inf)
+        if len(groups) == 1 and not colored:
+            return seen[np.argsort(depth, kind="stable")], [Call(groups[0], False, 0, len(seen))]
+        group = 2 * group_of[seen]
+        if magnified is not None:
+            group += magnified
+        nearest = np.full(2 * len(groups), np.inf)
         np.minimum.at(nearest, group, depth)
-        nearest += self._last[colored]
-        seen = seen[np.lexsort((depth, group, nearest[group]))]
-        start = np.flatnonzero(np.diff(group_of[seen], prepend=-1))
+        nearest += self._last[colored].repeat(2)
+        order = np.lexsort((depth, group, nearest[group]))
+        group = group[order]
+        start = np.flatnonzero(np.diff(group, prepend=-1))
         end = np.append(start, len(seen))[1:]
         calls = [
-            Call(groups[group_of[seen[a]]], int(a), int(b - a))
-            for a, b in zip(start, end, strict=True)
+            Call(groups[number >> 1], bool(number & 1), first, last - first)
+            for number, first, last in zip(
+                group[start].tolist(), start.tolist(), end.tolist(), strict=True
+            )
         ]
-        return seen, calls
+        return seen[order], calls
 
 
 def _numbered(groups: list[Group]) -> tuple[list[Any], NDArray[np.int64]]:

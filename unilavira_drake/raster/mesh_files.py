@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.errors import GeometryError
-from unilavira_drake.raster.pictures import picture_texture, stays_inside
+from unilavira_drake.raster.pictures import only_color, picture_texture, stays_inside
 from unilavira_drake.raster.surface import Surface, make_surface
 
 EXTENSIONS = (".obj", ".gltf", ".glb")
@@ -199,12 +199,17 @@ def _surface(
     material = getattr(part.visual, "material", None)
     masked = getattr(material, "alphaMode", None) == "MASK"
     cutoff = getattr(material, "alphaCutoff", None)
+    colors = _colors(part, gltf=gltf)
+    only = None if texture is None or masked else only_color(texture)
+    if only is not None:
+        # A picture of one colour costs three times as much to draw as the colour.
+        colors, texture = np.round(colors * (only[:3] / 255.0)).astype(np.uint8), None
     return make_surface(
         positions,
         normals,
         part.faces,
         uv=uv,
-        colors=_colors(part, gltf=gltf),
+        colors=colors,
         texture=texture,
         alpha_cutoff=(_DEFAULT_CUTOFF if cutoff is None else float(cutoff)) if masked else 0.0,
         linear=gltf,

@@ -64,6 +64,12 @@ def read_texture(path: Path, *, repeats: bool) -> Texture:
     return make_texture(pixels, repeats=repeats)
 
 
+def only_color(texture: Texture) -> NDArray[np.uint8] | None:
+    """Returns the (4,) RGBA of a picture that has no other, or None."""
+    first: NDArray[np.uint8] = texture.pixels[0, 0]
+    return first if (texture.pixels == first).all() else None
+
+
 def check_size(width: int, height: int) -> None:
     """Refuses a huge picture.
 

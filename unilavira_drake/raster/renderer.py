@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import QueryObject, SceneGraphInspector
+from pydrake.geometry import GeometryVersion, QueryObject, Role, SceneGraphInspector
 
 from unilavira_drake.ports import pose_matrix
 from unilavira_drake.raster.config import RasterCameraConfig
@@ -15,19 +16,32 @@ from unilavira_drake.raster.geometry import perception_ids, read_drawables
 from unilavira_drake.raster.scene import Exposure, Scene
 from unilavira_drake.raster.stage import Stage
 
+_ROLES = (Role.kPerception, Role.kIllustration, Role.kProximity)
+
 
 class _Key:
-    """A list of ids that is hashed once."""
+    """What a scene graph holds: a list of ids that is hashed once, and its version.
 
-    def __init__(self, names: list[Any]) -> None:
-        self.names = names
+    Without a render engine the version knows nothing of the perception role; so ids are compared,
+    and the other roles tell of a shape that changed under its id.
+    """
+
+    def __init__(self, names: list[Any], version: GeometryVersion) -> None:
+        self._names = names
+        self._version = version
         self._hash = hash(tuple(names))
+
+    def says(self, names: list[Any], version: GeometryVersion) -> bool:
+        """Whether these are the ids and the version."""
+        return self._names == names and all(version.IsSameAs(self._version, r) for r in _ROLES)
 
     def __hash__(self) -> int:
         return self._hash
 
     def __eq__(self, other: object) -> bool:
-        return self is other or (isinstance(other, _Key) and self.names == other.names)
+        return self is other or (
+            isinstance(other, _Key) and self.says(other._names, other._version)
+        )
 
 
 class RasterRenderer:
@@ -48,7 +62,7 @@ class RasterRenderer:
             for view in config.views
         ]
         pinholes = tuple(view.pinhole() for view in config.views)
-        self._key = _Key([])
+        self._key: _Key | None = None
         self._exposure = Exposure(pinholes, config.light, config.background)
 
     def scene(self, inspector: SceneGraphInspector) -> Scene:
@@ -60,8 +74,9 @@ class RasterRenderer:
         ids = perception_ids(inspector)
         # One GeometryInstance may stand in several scene graphs, with one id; a source may not.
         names = [*inspector.GetAllSourceIds(), *ids]
-        if names != self._key.names:
-            self._key = _Key(names)
+        version = inspector.geometry_version()
+        if self._key is None or not self._key.says(names, version):
+            self._key = _Key(names, copy.copy(version))
         scene: Scene = self._stage.scenes.get(
             self._key, lambda: Scene(self._stage, read_drawables(inspector, ids))
         )

@@ -17,9 +17,15 @@ from unilavira_drake.raster.geometry import Drawable
 from unilavira_drake.raster.hiding import farthest, hidden
 from unilavira_drake.raster.items import Call, Items
 from unilavira_drake.raster.light import Light
+from unilavira_drake.raster.shaders import exposure_block
 from unilavira_drake.raster.stage import Stage, Target
 
 _LINEAR_EXPONENT = 1.0 / 2.2
+
+_LINEAR, _LINEAR_MIPMAP_NEAREST = 0x2601, 0x2701
+_MAGNIFIED, _ANY_SIZE = (_LINEAR, _LINEAR), (_LINEAR_MIPMAP_NEAREST, _LINEAR)
+"""OpenGL's filters of a picture that is smaller or larger in view.  To blend two of its sizes as
+well costs a tenth more, and no difference is seen."""
 
 _WORTH_HIDING = 4000
 """Triangles; with less to draw, looking for hidden ones costs more than drawing them."""
@@ -42,6 +48,8 @@ class _View:
     clip: NDArray[np.float64]
     seen: NDArray[np.int64]
     """Surfaces that are not outside the image."""
+    magnified: NDArray[np.bool_] | None
+    """Of all surfaces, which need no smaller pictures; None when depth alone is drawn."""
 
 
 class Scene:
@@ -119,16 +127,19 @@ class Scene:
             self._instance_buffer.write(self._instances.view(np.uint8))
             context.enable_only(context.DEPTH_TEST)
             context.depth_func = "<="
-            if colored:
-                self._set_light(exposure.light)
             frames = []
             for pinhole, X in zip(exposure.pinholes, X_WC, strict=True):
-                clip = clip_matrix(pinhole) @ _inverse(X, origin)
+                X_CW = _inverse(X, origin)
+                clip = clip_matrix(pinhole) @ X_CW
                 seen = np.flatnonzero(visible(frustum(clip), *boxes))
+                magnified = self._items.magnified(seen, rows, X_CW, pinhole) if colored else None
                 target = self._stage.target(pinhole.width, pinhole.height)
                 (target.images if colored else target.depth).use()
                 target.clear(exposure.background, colored=colored)
-                self._draw_view(target, _View(pinhole, clip, seen), boxes, colored=colored)
+                self._stage.exposure.write(exposure_block(clip, pinhole, exposure.light))
+                self._draw_view(
+                    target, _View(pinhole, clip, seen, magnified), boxes, colored=colored
+                )
                 frames.append(_read(target, pinhole, colored=colored))
             return tuple(frames)
 
@@ -141,7 +152,6 @@ class Scene:
         colored: bool,
     ) -> None:
         """Draws large simple surfaces, then of the others what these do not hide."""
-        self._set_view(view, colored=colored)
         screens = self._items.screens[view.seen]
         first, others = view.seen[screens], view.seen[~screens]
         if self._items.triangles[others].sum() < _WORTH_HIDING or len(first) == 0:
@@ -167,7 +177,8 @@ class Scene:
         if len(chosen) == 0:
             return
         depth = boxes[0][chosen] @ view.clip[3, :3] + view.clip[3, 3]
-        order, calls = self._items.in_order(chosen, depth, colored=colored)
+        magnified = None if view.magnified is None else view.magnified[chosen]
+        order, calls = self._items.in_order(chosen, depth, magnified)
         commands = self._items.commands[order]
         self._command_buffer.orphan(commands.nbytes)
         self._command_buffer.write(commands.view(np.uint8))
@@ -180,7 +191,9 @@ class Scene:
         defines = ("COLORED",) * colored + ("TEXTURED",) * bool(group.picture)
         defines += ("MASKED",) * holes
         if group.picture:
-            self._batch.textures[group.picture].use(0)
+            texture = self._batch.textures[group.picture]
+            texture.use(0)
+            texture.filter = _MAGNIFIED if call.magnified else _ANY_SIZE
         if holes:
             self._stage.programs[defines]["cutoff"].value = group.cutoff
         if not group.labelled:
@@ -190,20 +203,6 @@ class Scene:
         )
         if not group.labelled:
             target.mask_labels(False)
-
-    def _set_light(self, light: Light) -> None:
-        for program in self._stage.programs.values():
-            if "suns" in program:
-                program["light_from_above"].value = light.sides(1.0)
-                program["light_from_below"].value = light.sides(-1.0)
-                program["suns"].value = light.padded()
-
-    def _set_view(self, view: _View, *, colored: bool) -> None:
-        matrix = view.clip.T.astype("<f4").tobytes()
-        for defines, program in self._stage.programs.items():
-            if colored == ("COLORED" in defines):
-                program["clip_from_world"].write(matrix)
-                program["depth_range"].value = (view.pinhole.min_depth, view.pinhole.max_depth)
 
 
 def _inverse(X: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[np.float64]:

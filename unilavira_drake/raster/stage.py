@@ -101,6 +101,8 @@ class Stage:
                     ("TEXTURED", "MASKED"),
                 )
             }
+            self.exposure = self._context.buffer(reserve=shaders.EXPOSURE.itemsize, dynamic=True)
+            self.exposure.bind_to_uniform_block(0)
 
     @contextmanager
     def current(self) -> Iterator[Any]:
@@ -117,7 +119,6 @@ class Stage:
             found = self._context.texture((width, height), 4, texture.pixels)
             found.use(0)
             self._upload_levels(texture.pixels)
-            found.filter = (self._context.LINEAR_MIPMAP_LINEAR, self._context.LINEAR)
             found.repeat_x = found.repeat_y = texture.repeats
             self._textures[texture.key] = found
         return found
@@ -156,12 +157,10 @@ class Stage:
         return len(self.scenes), len(self.batches), len(self._textures)
 
     def _program(self, vertex: str, fragment: str, defines: tuple[str, ...]) -> Any:
-        program = self._context.program(
+        return self._context.program(
             vertex_shader=shaders.source(vertex, *defines),
             fragment_shader=shaders.source(fragment, *defines),
         )
-        program["infinity"].value = INFINITY
-        return program
 
     def release(self) -> None:
         """Frees the context; nothing can be drawn any more."""

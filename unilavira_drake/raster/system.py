@@ -40,7 +40,11 @@ class RasterCamera(LeafSystem):
     pixels once it is pulled.  A pull of depth alone draws depth alone.
 
     Pictures depend on geometries and poses alone, not on the Context.  A geometry that is added or
-    removed is noticed by its id; a changed shape or property under the same id is not.
+    removed is noticed by its id.  A shape that changes under the same id is noticed where the
+    geometry has the proximity or the illustration role, too.  A changed perception property is
+    not, unless the scene graph has a render engine: without one SceneGraph keeps no version of
+    that role, and to read all properties for each picture would cost as much as a small picture.
+    Register the geometry anew instead.
 
     Args:
         stage: where to draw.
@@ -108,6 +112,8 @@ class RasterCamera(LeafSystem):
             context: of this System.
             colored: whether colour and label are wanted beside depth.
         """
+        if not colored and not self.get_cache_entry(self._frames[True]).is_out_of_date(context):
+            colored = True
         frames: Any = self.get_cache_entry(self._frames[colored]).Eval(context)
         return tuple(frames)
 
