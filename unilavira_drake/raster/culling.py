@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from unilavira_drake.kernels import frozen_view, kernel
 from unilavira_drake.messages import Message
 
 
@@ -67,8 +68,33 @@ def visible(
         centers: (n, 3) of the boxes.
         axes: (n, 3, 3); the columns are the half edges as vectors.
     """
-    distance = centers @ planes[:, :3].T + planes[:, 3]
-    edges = axes.transpose(0, 2, 1).reshape(-1, 3)
-    reach = np.abs(edges @ planes[:, :3].T).reshape(-1, 3, len(planes)).sum(axis=1)
-    seen: NDArray[np.bool_] = (distance + reach >= 0.0).all(axis=1)
+    return _visible(
+        frozen_view(planes, np.float64),
+        frozen_view(centers, np.float64),
+        frozen_view(axes, np.float64),
+    )
+
+
+def warm_up() -> None:
+    """Compiles the kernel."""
+    visible(np.zeros((6, 4)), np.zeros((1, 3)), np.zeros((1, 3, 3)))
+
+
+@kernel
+def _visible(
+    planes: NDArray[np.float64], centers: NDArray[np.float64], axes: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    seen = np.ones(len(centers), np.bool_)
+    for n in range(len(centers)):
+        for plane in planes:
+            reach = plane[3]
+            for i in range(3):
+                reach += plane[i] * centers[n, i]
+            for j in range(3):
+                reach += abs(
+                    plane[0] * axes[n, 0, j] + plane[1] * axes[n, 1, j] + plane[2] * axes[n, 2, j]
+                )
+            if reach < 0.0:
+                seen[n] = False
+                break
     return seen

@@ -8,22 +8,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from unilavira_drake.kernels import frozen_view, kernel
+
 TILE = 16
 """Pixels a side of a tile of the coarse depth."""
 
 _MARGIN = 1e-3
-_SIGNS = np.array([(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)], float)
 
 
 def farthest(depth: NDArray[np.float32]) -> NDArray[np.float32]:
     """Returns the greatest depth in each tile of an image, (ceil(H / 16), ceil(W / 16))."""
-    rows, columns = -(-depth.shape[0] // TILE), -(-depth.shape[1] // TILE)
-    missing = rows * TILE - depth.shape[0], columns * TILE - depth.shape[1]
-    if any(missing):
-        depth = np.pad(depth, ((0, missing[0]), (0, missing[1])))
-    by_row = depth.reshape(rows, TILE, -1).max(axis=1)
-    tiles: NDArray[np.float32] = by_row.reshape(rows, columns, TILE).max(axis=2)
-    return tiles
+    return _farthest(frozen_view(depth, np.float32))
 
 
 def hidden(
@@ -42,24 +37,99 @@ def hidden(
         middles: (n, 3) of the boxes.
         axes: (n, 3, 3); the columns are the half edges as vectors.
     """
-    rows = clip_from_world[[0, 1, 3]]
-    middle = middles @ rows[:, :3].T + rows[:, 3]
-    # One plain product for all boxes is much faster than a small one for each.
-    edges = (axes.transpose(0, 2, 1).reshape(-1, 3) @ rows[:, :3].T).reshape(-1, 3, 3)
-    corners = edges.transpose(0, 2, 1).reshape(-1, 3) @ _SIGNS.T
-    clip = corners.reshape(-1, 3, 8) + middle[:, :, None]
-    depth = clip[:, 2]
-    nearest = depth.min(axis=1)
-    ahead = nearest > _MARGIN
-    ahead_or_one = np.where(depth > _MARGIN, depth, 1.0)
-    pixels = (clip[:, :2] / ahead_or_one[:, None, :] + 1.0) * (np.array(size)[:, None] / 2.0)
-    # A pixel more on each side, against rounding.
-    low = np.floor((pixels.min(axis=2) - 1.0) / TILE)
-    high = np.floor((pixels.max(axis=2) + 1.0) / TILE)
-    column, row = np.arange(tiles.shape[1]), np.arange(tiles.shape[0])
-    across = (column >= low[:, :1]) & (column <= high[:, :1])
-    down = (row >= low[:, 1:]) & (row <= high[:, 1:])
-    behind = tiles < (nearest - _MARGIN)[:, None, None]
-    touched = down[:, :, None] & across[:, None, :]
-    result: NDArray[np.bool_] = ahead & ~(touched & ~behind).any(axis=(1, 2))
+    return _hidden(
+        frozen_view(tiles, np.float32),
+        float(size[0]),
+        float(size[1]),
+        frozen_view(clip_from_world[[0, 1, 3]], np.float64),
+        frozen_view(middles, np.float64),
+        frozen_view(axes, np.float64),
+    )
+
+
+def warm_up() -> None:
+    """Compiles the kernels."""
+    tiles = farthest(np.zeros((1, 1), np.float32))
+    hidden(tiles, (1, 1), np.eye(4), np.zeros((1, 3)), np.zeros((1, 3, 3)))
+
+
+@kernel
+def _farthest(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    height, width = depth.shape
+    tiles = np.zeros((-(-height // TILE), -(-width // TILE)), np.float32)
+    for v in range(height):
+        row = tiles[v // TILE]
+        for u in range(width):
+            if depth[v, u] > row[u // TILE]:
+                row[u // TILE] = depth[v, u]
+    return tiles
+
+
+@kernel
+def _hidden(
+    tiles: NDArray[np.float32],
+    width: float,
+    height: float,
+    rows: NDArray[np.float64],
+    middles: NDArray[np.float64],
+    axes: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    result = np.zeros(len(middles), np.bool_)
+    edges, middle = np.empty((3, 3)), np.empty(3)
+    for n in range(len(middles)):
+        for i in range(3):
+            for j in range(3):
+                edges[i, j] = (
+                    rows[i, 0] * axes[n, 0, j]
+                    + rows[i, 1] * axes[n, 1, j]
+                    + rows[i, 2] * axes[n, 2, j]
+                )
+            middle[i] = (
+                rows[i, 0] * middles[n, 0]
+                + rows[i, 1] * middles[n, 1]
+                + rows[i, 2] * middles[n, 2]
+                + rows[i, 3]
+            )
+        nearest = middle[2] - abs(edges[2, 0]) - abs(edges[2, 1]) - abs(edges[2, 2])
+        if nearest <= _MARGIN:
+            continue
+        u_min, v_min, u_max, v_max = np.inf, np.inf, -np.inf, -np.inf
+        for corner in range(8):
+            a, b, c = 2 * (corner & 1) - 1, (corner & 2) - 1, (corner & 4) / 2 - 1
+            depth = middle[2] + a * edges[2, 0] + b * edges[2, 1] + c * edges[2, 2]
+            x = (middle[0] + a * edges[0, 0] + b * edges[0, 1] + c * edges[0, 2]) / depth
+            y = (middle[1] + a * edges[1, 0] + b * edges[1, 1] + c * edges[1, 2]) / depth
+            u_min, u_max = min(u_min, x), max(u_max, x)
+            v_min, v_max = min(v_min, y), max(v_max, y)
+        result[n] = _covered(
+            tiles,
+            nearest - _MARGIN,
+            (u_min + 1.0) * width / 2.0,
+            (v_min + 1.0) * height / 2.0,
+            (u_max + 1.0) * width / 2.0,
+            (v_max + 1.0) * height / 2.0,
+        )
     return result
+
+
+@kernel
+def _covered(
+    tiles: NDArray[np.float32],
+    nearest: float,
+    u_min: float,
+    v_min: float,
+    u_max: float,
+    v_max: float,
+) -> bool:
+    """Whether all tiles of a rectangle, a pixel larger on each side, are nearer than a depth."""
+    rows, columns = tiles.shape
+    # Clipped before they become whole numbers: a corner just ahead of the camera is far outside.
+    first_row = int(min(max((v_min - 1.0) / TILE, 0.0), rows))
+    first_column = int(min(max((u_min - 1.0) / TILE, 0.0), columns))
+    last_row = int(np.floor(min(max((v_max + 1.0) / TILE, -1.0), rows - 1.0)))
+    last_column = int(np.floor(min(max((u_max + 1.0) / TILE, -1.0), columns - 1.0)))
+    for i in range(first_row, last_row + 1):
+        for j in range(first_column, last_column + 1):
+            if tiles[i, j] >= nearest:
+                return False
+    return True

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import weakref
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import GeometryVersion, QueryObject, Role, SceneGraphInspector
 
 from unilavira_drake.ports import pose_matrix
+from unilavira_drake.raster import culling, hiding
 from unilavira_drake.raster.config import RasterCameraConfig
 from unilavira_drake.raster.frames import Frame
 from unilavira_drake.raster.geometry import perception_ids, read_drawables
@@ -63,6 +66,10 @@ class RasterRenderer:
         ]
         pinholes = tuple(view.pinhole() for view in config.views)
         self._key: _Key | None = None
+        # Held by the stage, for as long as it has room.
+        self._scene: Callable[[], Scene | None] = lambda: None
+        culling.warm_up()
+        hiding.warm_up()
         self._exposure = Exposure(pinholes, config.light, config.background)
 
     def scene(self, inspector: SceneGraphInspector) -> Scene:
@@ -75,11 +82,14 @@ class RasterRenderer:
         # One GeometryInstance may stand in several scene graphs, with one id; a source may not.
         names = [*inspector.GetAllSourceIds(), *ids]
         version = inspector.geometry_version()
-        if self._key is None or not self._key.says(names, version):
-            self._key = _Key(names, copy.copy(version))
+        known = self._scene()
+        if known is not None and self._key is not None and self._key.says(names, version):
+            return known
+        self._key = _Key(names, copy.copy(version))
         scene: Scene = self._stage.scenes.get(
             self._key, lambda: Scene(self._stage, read_drawables(inspector, ids))
         )
+        self._scene = weakref.ref(scene)
         return scene
 
     def draw(self, query: QueryObject, *, colored: bool) -> tuple[Frame, ...]:
