@@ -1,4 +1,4 @@
-"""Packs ``models/`` and ``prompts/`` into standard wheels.
+"""Packs ``models/``, ``prompts/`` and the cassettes of ``examples/`` into standard wheels.
 
 A plain ``force-include`` would also leave a stale copy beside an editable install, where the
 checkout itself must be read.
@@ -17,5 +17,5 @@ class PackageDataHook(BuildHookInterface):  # type: ignore[type-arg]
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Force-includes the data folders unless the target is an editable install."""
         if version == "standard":
-            for folder in ("models", "prompts"):
+            for folder in ("models", "prompts", "examples/cassettes"):
                 build_data["force_include"][folder] = f"unilavira_drake/{folder}"

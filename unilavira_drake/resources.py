@@ -41,6 +41,15 @@ def prompts_path() -> Path:
     return _folder("prompts")
 
 
+def cassettes_path() -> Path:
+    """Returns the folder of the cassettes that come with the package.
+
+    Raises:
+        InfrastructureError: if the installation lacks it.
+    """
+    return _folder("examples/cassettes")
+
+
 def package_xml() -> Path:
     """Returns the file that makes ``package://unilavira_drake/`` known to Drake's parser.
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import signal
+import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -197,6 +201,25 @@ def test_a_mailbox_answers_a_free_text(capsys: pytest.CaptureFixture[str]) -> No
     captured = capsys.readouterr()
     assert captured.out == '{"a": "person"}\n'
     assert captured.err.startswith("mailbox: tokens not counted, cost not known, ")
+
+
+def test_an_interrupt_ends_the_wait() -> None:
+    program = "import sys; from unilavira_drake.cli.main import main; sys.exit(main())"
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        spec = f"openai:m@http://127.0.0.1:{silent.getsockname()[1]}/v1"
+        command = [sys.executable, "-c", program, "ask", "--model", spec, "--text", "Hello."]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            connection, _ = silent.accept()
+            assert connection.recv(4) == b"POST"
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=20.0)
+            while connection.recv(65536):  # Until the client has closed it.
+                pass
+            connection.close()
+    assert process.returncode == 130
+    assert (out, err) == (b"", b"")
 
 
 def test_what_a_terminal_would_obey_is_shown_harmless(

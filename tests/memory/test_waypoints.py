@@ -76,7 +76,7 @@ def test_first_panorama_makes_the_first_waypoint() -> None:
 def test_edge_caption_and_offer_of_a_drive() -> None:
     state = step(WaypointState(), panorama(1, 0, 0, yaw=1.0))
     state = step(state, panorama(2, 0, 4), turn(1, "left", scene="a bedroom"), target="white door")
-    assert [w.caption for w in state.history.waypoints] == ["a bedroom", "white door"]
+    assert [w.caption for w in state.history.waypoints] == [("", "a bedroom"), ("white door", "")]
     (edge,) = state.history.edges
     assert (edge.waypoint, edge.direction, edge.to, edge.outcome) == (1, "left", 2, "arrived")
     assert edge.bearing == pytest.approx(1.0 + math.pi / 2)
@@ -117,10 +117,10 @@ def test_arrived_backtrack_names_the_failed_direction_and_its_pictures() -> None
     assert state.history.current == 2
     assert [p.label for p in state.history.keyframes] == [
         "H1: front view at waypoint 1",
-        "H2: on the way from waypoint 1, towards its front",
+        "H2: on the way that left waypoint 1 by its front view",
         "H3: front view at waypoint 2",
-        "H4: on the way from waypoint 2, towards its left",
-        "H5: on the way from waypoint 2, towards its left",
+        "H4: on the way that left waypoint 2 by its left view",
+        "H5: on the way that left waypoint 2 by its left view",
         "H6: front view at waypoint 3",
     ]
 
@@ -188,7 +188,7 @@ def test_buffer_is_bounded_and_keeps_the_start() -> None:
 def test_caption_is_at_most_160_characters() -> None:
     state = step(WaypointState(), panorama(1, 0, 0))
     state = step(state, panorama(2, 3, 0), turn(1, "front", scene="x" * 400))
-    assert len(state.history.waypoints[0].caption) == 160
+    assert len("".join(state.history.waypoints[0].caption)) <= 160
 
 
 def test_a_way_that_got_stuck_half_way_is_the_one_that_failed() -> None:

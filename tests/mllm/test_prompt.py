@@ -52,16 +52,18 @@ VARIABLES = LanguageVariables(
     current_waypoint=2,
     waypoints=(
         WaypointNote(
-            1, 3.2, 178.0, -90.0, "bed; a bedroom", ("front: arrived at waypoint 2",), True, "H1"
+            1, 3.2, 178.0, -90.0, "a bedroom", ("front: arrived at waypoint 2",), True, "H1"
         ),
-        WaypointNote(2, 0.0, 0.0, 0.0, "door frame; a corridor", ("right: failed: stuck",), False),
+        WaypointNote(
+            2, 0.0, 0.0, 0.0, "a corridor", ("right: failed: stuck",), False, "", "door frame"
+        ),
     ),
     decisions=(DecisionNote(2, "at waypoint 1: turn front to 'door frame': arrived"),),
     failed_edges=("waypoint 2, right: failed: stuck",),
 )
 PAST = (
     ImagePart("H1: front view at waypoint 1", b"first", "low"),
-    ImagePart("H2: on the way from waypoint 1, towards its front", b"second", "low"),
+    ImagePart("H2: on the way that left waypoint 1 by its front view", b"second", "low"),
 )
 IMAGES = tuple(ImagePart(f"view {d}", d.encode(), "medium") for d in DIRECTIONS)
 DECIDE = MllmRequest(n=4, call="decide", variables=VARIABLES, images=PAST + IMAGES)
@@ -266,7 +268,7 @@ def test_hostile_text_stays_inside_its_quotes() -> None:
         rejection=HOSTILE,
         todo=(TodoItem(HOSTILE, "completed", HOSTILE),),
         todo_feedback=(HOSTILE,),
-        waypoints=(WaypointNote(1, caption=HOSTILE, tried=(HOSTILE,)),),
+        waypoints=(WaypointNote(1, target=HOSTILE, scene=HOSTILE, tried=(HOSTILE,)),),
         decisions=(DecisionNote(1, HOSTILE),),
         outcome="failed: " + HOSTILE,
     )
@@ -277,7 +279,7 @@ def test_hostile_text_stays_inside_its_quotes() -> None:
     ]
     assert text.count("\nYOUR REPLY") == text.count("\nTHE TASK") == text.count("\nRULES") == 1
     assert 'exit"' not in text.replace('exit\\"', "")
-    assert text.count("{{ task }}") == 10
+    assert text.count("{{ task }}") == 11
     assert composed.images == PAST + IMAGES
     ground = compose_prompt(
         _with(GROUND, task=HOSTILE, progress_analysis=HOSTILE, reasoning_action=HOSTILE)
@@ -307,12 +309,12 @@ def test_what_a_model_wrote_is_cut_to_its_length() -> None:
             rejection=flood,
             todo=(TodoItem(flood, "completed", flood),),
             todo_feedback=(flood,),
-            waypoints=(WaypointNote(1, caption=flood, tried=(flood,)),),
+            waypoints=(WaypointNote(1, target=flood, scene=flood, tried=(flood,)),),
             decisions=(DecisionNote(1, flood),),
         )
     )
     assert len(text) < len(_text(DECIDE)) + 4000
-    assert text.count('…"') == 8
+    assert text.count('…"') == 9
 
 
 def test_evidence_never_enters_the_text() -> None:

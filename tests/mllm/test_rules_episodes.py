@@ -163,7 +163,10 @@ def mirrored(request):
         ),
         waypoints=tuple(
             dataclasses.replace(
-                w, bearing=-w.bearing, heading=-w.heading, caption=turned_caption(w.caption),
+                w,
+                bearing=-w.bearing,
+                heading=-w.heading,
+                scene=turned_caption(w.scene),
                 tried=tuple(exchanged(text) for text in w.tried),
             )
             for w in v.waypoints

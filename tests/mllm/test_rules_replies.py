@@ -164,7 +164,8 @@ def test_a_dead_end_is_left_by_a_backtrack_to_the_corridor_when_that_is_offered(
     notes = (
         WaypointNote(
             id=2, distance=2.5, bearing=180.0, heading=0.0, offered=True,
-            caption="open floor; In the corridor; exits: bathroom +0 deg 1.0 m, ? +90 deg 3.0 m",
+            target="open floor",
+            scene="In the corridor; exits: bathroom +0 deg 1.0 m, ? +90 deg 3.0 m",
             tried=("front: arrived at waypoint 1",),
         ),
         WaypointNote(id=1),

@@ -141,12 +141,14 @@ def _waypoint_note(
     x, y, _ = panorama.position
     dx, dy = waypoint.position[0] - x, waypoint.position[1] - y
     front = _front(waypoint, panorama, history)
+    target, scene = waypoint.caption
     return WaypointNote(
         id=waypoint.id,
         distance=round(math.hypot(dx, dy), 2),
         bearing=_degrees(math.atan2(dy, dx) - panorama.yaw) if dx or dy else 0.0,
         heading=_degrees(waypoint.heading - panorama.yaw),
-        caption=waypoint.caption,
+        target=target,
+        scene=scene,
         tried=tuple(
             _edge_text(edge, front)
             for edge in history.edges

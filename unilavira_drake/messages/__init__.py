@@ -36,6 +36,7 @@ from unilavira_drake.messages.plans import (
     OccupancyMap,
     Path,
 )
+from unilavira_drake.messages.voxels import VoxelMap
 
 __all__ = [
     "CALLS",
@@ -64,6 +65,7 @@ __all__ = [
     "TodoList",
     "TodoUpdate",
     "VisionAction",
+    "VoxelMap",
     "Waypoint",
     "direction_of",
     "read_only",

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from unilavira_drake.messages.frozen import Message
 
 CAPTION_LENGTH = 160
-TARGET_SHARE = 58
-"""Of a caption's characters the target takes at most these, so that a scene of 100 fits whole."""
+"""Characters of a waypoint's target and scene together."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +48,10 @@ class Waypoint(Message):
     """Number of the key picture that shows its front view; 0 when none does."""
 
     @property
-    def caption(self) -> str:
-        """Target and scene in one line of at most 160 characters; quoted as data in prompts."""
-        target = _clipped(self.target_desc, TARGET_SHARE)
-        text = "; ".join(part for part in (target, self.scene) if part)
-        return _clipped(text, CAPTION_LENGTH)
+    def caption(self) -> tuple[str, str]:
+        """Target and scene, together at most 160 characters; quoted as data in prompts."""
+        scene = _clipped(self.scene, CAPTION_LENGTH)
+        return _clipped(self.target_desc, CAPTION_LENGTH - len(scene)), scene
 
 
 @dataclass(frozen=True)
@@ -77,9 +75,10 @@ class KeyPicture(Message):
 
     @property
     def label(self) -> str:
-        """Name and what it is, e.g. ``H7: on the way from waypoint 2, left to its left``."""
+        """Name and what it is, e.g. ``H1: front view at waypoint 1``."""
         if self.direction:
-            return f"{self.name}: on the way from waypoint {self.waypoint}, towards its {self.direction}"
+            way = f"on the way that left waypoint {self.waypoint} by its {self.direction} view"
+            return f"{self.name}: {way}"
         return f"{self.name}: front view at waypoint {self.waypoint}"
 
 
@@ -153,5 +152,7 @@ def _clipped(text: str, limit: int) -> str:
     """Returns the text, cut after a word, with an ellipsis, to at most ``limit`` characters."""
     if len(text) <= limit:
         return text
-    head = text[: limit - 1]
+    head = text[: max(limit - 1, 0)]
+    if not head:
+        return ""
     return (head.rpartition(" ")[0] or head).rstrip(" ,;") + "…"

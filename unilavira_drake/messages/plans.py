@@ -50,13 +50,13 @@ class NavigationStatus(Message):
 
 @dataclass(frozen=True, eq=False)
 class Path(Message):
-    """A polyline on the floor for goal ``n``; empty once the goal is done."""
+    """A polyline on the floor, or in the air, for goal ``n``; empty once the goal is done."""
 
     n: int = 0
     version: int = 0
     """Counts the replans of this goal."""
     p_WP: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
-    """(k, 2) float64, metres in the world, from the robot to the goal."""
+    """(k, 2) float64, in the air (k, 3), metres in the world, from the robot to the goal."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))

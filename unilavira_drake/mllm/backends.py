@@ -14,12 +14,14 @@ from unilavira_drake.mllm.remote import RemoteModel
 from unilavira_drake.mllm.replay import CassetteModel
 from unilavira_drake.mllm.reply import Mllm
 from unilavira_drake.mllm.rules import RulesModel
+from unilavira_drake.resources import cassettes_path
 
 SPECS = (
     "rules[:PRESET] | random | frontier | cassette:FILE | mailbox:DIR | PROFILE | PROFILE.yaml | "
     "openai:MODEL@BASE_URL"
 )
-"""What a spec may be, for help texts."""
+"""What a spec may be, for help texts; FILE may be the bare name of a cassette that comes with the
+package."""
 
 _PROGRAMS: dict[str, Callable[[], Mllm]] = {
     "rules": RulesModel,
@@ -53,7 +55,9 @@ def make_backend(spec: str, *, role: str, place: str) -> Mllm:
             raise ScenarioError(f"{place}: {spec!r} must be {_FOLDERS[name]}.")
         path = Path(rest).expanduser()
         try:
-            return CassetteModel(path, role=role) if name == "cassette" else MailboxModel(path)
+            if name == "mailbox":
+                return MailboxModel(path)
+            return CassetteModel(_shipped_cassettes().get(rest, path), role=role)
         except InputError as error:
             raise ScenarioError(f"{place}: {error}") from None
     if name not in _PROGRAMS:
@@ -63,6 +67,11 @@ def make_backend(spec: str, *, role: str, place: str) -> Mllm:
     if spec != name and rest not in presets:
         raise ScenarioError(unknown_name(f"preset of {name!r}", rest, presets, place))
     return _PROGRAMS[name]()
+
+
+def _shipped_cassettes() -> dict[str, Path]:
+    """Returns the cassettes that come with the package, by their names."""
+    return {path.stem: path for path in sorted(cassettes_path().glob("*.jsonl"))}
 
 
 def profile_of(spec: str, *, place: str) -> Profile | None:

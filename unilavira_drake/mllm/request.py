@@ -36,13 +36,21 @@ class WaypointNote(Message):
     bearing: float = 0.0
     heading: float = 0.0
     """Where this waypoint's own ``front`` points, degrees left of the present ``front``."""
-    caption: str = ""
+    scene: str = ""
+    """What it saw there."""
     tried: tuple[str, ...] = ()
     """One text a direction tried from there, e.g. ``left: arrived at waypoint 3``."""
     offered: bool = False
     """Whether ``backtrack`` may name it."""
     picture: str = ""
     """Name of the picture of its front view, e.g. ``H3``; empty when no picture shows it."""
+    target: str = ""
+    """What the robot went there for."""
+
+    @property
+    def caption(self) -> str:
+        """Target and scene in one line."""
+        return "; ".join(part for part in (self.target, self.scene) if part)
 
 
 @dataclass(frozen=True)

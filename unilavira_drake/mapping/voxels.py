@@ -1,0 +1,151 @@
+"""The voxel map: depth images in, a new frozen map that shares what did not change out."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.kernels import frozen_view
+from unilavira_drake.mapping.occupancy import DepthView
+from unilavira_drake.mapping.voxels_carving import apply, carve, extent, sample
+from unilavira_drake.messages import Message, VoxelMap
+from unilavira_drake.messages.voxels import TILE, overlap, tiles_between
+
+MAX_SPAN = 400
+"""Most voxels between the camera and the end of its range."""
+
+FARTHEST = 1e6
+"""A camera farther than this from the world's origin along an axis is not believed, metres."""
+
+
+@dc.dataclass(frozen=True)
+class VoxelParameters(Message):
+    """How depth becomes voxels; metres.
+
+    Raises:
+        ValueError: if a number makes no sense, or the range has too many voxels.
+    """
+
+    resolution: float = 0.5
+    max_range: float = 40.0
+    """Distance from the camera up to which depth counts; beyond, a ray only frees."""
+    saturation: float = math.inf
+    """Readings from here on are none: what the sensor says when it knows nothing."""
+    far_is_free: bool = False
+    """Whether a reading of inf says that nothing lies within the range, as it does for Drake's
+    cameras.  Otherwise it is no reading."""
+    stride: int = 4
+    """Every so many rows and columns of the image are read."""
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.resolution < math.inf and 0.0 < self.max_range < math.inf):
+            raise ValueError("resolution and max_range must be positive")
+        if self.max_range > MAX_SPAN * self.resolution:
+            raise ValueError(f"max_range must be at most {MAX_SPAN} voxels")
+        if self.stride < 1 or not self.saturation > 0.0:
+            raise ValueError("stride and saturation must be positive")
+
+
+def integrate_voxels(
+    voxels: VoxelMap,
+    views: Sequence[DepthView],
+    *,
+    parameters: VoxelParameters,
+    n: int,
+    time: float,
+) -> VoxelMap:
+    """Returns the map after these views, as a new value with the next version.
+
+    Views that make no sense are left out, and ``rejected`` of the new map says why.
+
+    Args:
+        voxels: the map so far; version 0 is replaced by an empty one of the right resolution.
+        views: depth images with their poses, in any attitude.
+        parameters: resolution and range.
+        n: number of the latest panorama that is part of the new map.
+        time: simulated time of the new map, seconds.
+
+    Raises:
+        ValueError: if the map has another resolution.
+    """
+    if voxels.version > 0 and voxels.resolution != parameters.resolution:
+        raise ValueError(
+            f"the map's voxels are {voxels.resolution:g} m, not {parameters.resolution:g} m"
+        )
+    tiles = dict(voxels.tiles)
+    rejected = []
+    for number, view in enumerate(views):
+        fault = fault_of(view)
+        if fault:
+            rejected.append(f"view {number}: {fault}")
+        else:
+            _integrate_view(tiles, view, parameters)
+    return VoxelMap(
+        n=n,
+        version=voxels.version + 1,
+        time=time,
+        resolution=parameters.resolution,
+        tiles=tiles,
+        rejected=tuple(rejected),
+    )
+
+
+def fault_of(view: DepthView) -> str:
+    """Returns why a view cannot be integrated; empty if it can."""
+    depth, lens = np.asarray(view.depth), view.intrinsics
+    if depth.ndim != 2 or depth.size == 0 or depth.dtype.kind != "f":
+        return f"a depth image is (H, W) of floats, not {depth.shape} of {depth.dtype}"
+    if depth.shape != (lens.height, lens.width):
+        shape = f"{depth.shape[1]} x {depth.shape[0]}"
+        return f"the depth image is {shape}, its intrinsics {lens.width} x {lens.height}"
+    numbers = (lens.fx, lens.fy, lens.cx, lens.cy)
+    if not all(map(math.isfinite, numbers)) or min(lens.fx, lens.fy) <= 0.0:
+        return f"impossible intrinsics: fx, fy, cx, cy = {numbers}"
+    X_WC = np.asarray(view.X_WC)
+    if X_WC.shape != (4, 4) or X_WC.dtype.kind != "f" or not np.isfinite(X_WC).all():
+        return "the camera's pose is not a finite 4 x 4 matrix"
+    R_WC = X_WC[:3, :3]
+    if np.abs(R_WC).max() > 2.0 or np.abs(R_WC @ R_WC.T - np.eye(3)).max() > 1e-3:
+        return "the camera's rotation is not a rotation"
+    if np.abs(X_WC[:3, 3]).max() > FARTHEST:
+        return f"the camera is farther than {FARTHEST:g} m from the world's origin"
+    return ""
+
+
+def _integrate_view(
+    tiles: dict[tuple[int, int, int], NDArray[Any]], view: DepthView, parameters: VoxelParameters
+) -> None:
+    """Replaces the tiles that the view changes."""
+    stride, lens = parameters.stride, view.intrinsics
+    shape = tuple(-(-(size - stride // 2) // stride) for size in view.depth.shape)
+    if min(shape) <= 0:
+        return
+    camera = np.array([lens.fx, lens.fy, lens.cx, lens.cy])
+    limits = np.array(
+        [parameters.max_range, parameters.saturation, 1.0 if parameters.far_is_free else 0.0]
+    )
+    readings, sights = np.empty(shape), np.empty(shape)
+    sample(frozen_view(view.depth, np.float32), stride, camera, limits, readings, sights)
+    pose = np.ascontiguousarray(view.X_WC[:3] / parameters.resolution, np.float64)
+    box = np.empty((2, 3), np.int64)
+    extent(stride, camera, pose, readings, sights, box)
+    # The window consists of whole tiles.
+    low = box[0] // TILE * TILE
+    high = (box[1] // TILE + 1) * TILE
+    stamps = np.zeros(tuple(high - low), np.uint8)
+    carve(stride, camera, pose, readings, sights, low, stamps)
+    empty = VoxelMap()
+    corner = (int(low[0]), int(low[1]), int(low[2]))
+    end = (int(high[0]), int(high[1]), int(high[2]))
+    for key in tiles_between(corner, end):
+        _, there = overlap(key, corner, end)
+        old = tiles.get(key)
+        new = np.empty((TILE, TILE, TILE), np.int8)
+        if apply(empty.tile(key) if old is None else old, stamps[there], new):
+            new.flags.writeable = False
+            tiles[key] = new

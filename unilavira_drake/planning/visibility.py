@@ -1,0 +1,312 @@
+"""One flight plan: from where things are, a position and a target to a path through free space."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.kernels import frozen_view, kernel
+from unilavira_drake.messages import Message
+from unilavira_drake.planning import (
+    visibility_any_angle,
+    visibility_graph,
+    visibility_lines,
+    visibility_snapping,
+    visibility_space,
+    visibility_window,
+)
+from unilavira_drake.planning.visibility_any_angle import FOUND, TOO_LARGE, any_angle_path
+from unilavira_drake.planning.visibility_graph import visibility_path
+from unilavira_drake.planning.visibility_lines import (
+    Slopes,
+    edge,
+    path_cost,
+    sees,
+    shorten,
+    slopes_of,
+    unfold,
+)
+from unilavira_drake.planning.visibility_snapping import snap_goal, way_out
+from unilavira_drake.planning.visibility_space import Clearance, FlightSpace
+from unilavira_drake.planning.visibility_window import FlightWindow, make_window, reachable
+
+Point = tuple[float, float, float]
+
+UNREACHABLE = "unreachable"
+NO_WAY_OUT = "no free space around the aircraft"
+TOO_STEEP = "no way within the limits of climb and descent"
+
+NEAR = 80
+"""To goals nearer than this the any-angle path is not compared with corners, voxels."""
+
+SIZES = (2**11, 2**13, 2**16, 2**20)
+"""Most nodes of an any-angle search, and of the next when that was not enough."""
+
+ROUNDS = 10
+"""Most rounds of shortening."""
+
+
+@dataclass(frozen=True)
+class FlightParameters(Message):
+    """The aircraft's size and limits.
+
+    Raises:
+        ValueError: if the limits leave nothing to fly in.
+    """
+
+    clearance: Clearance = Clearance()
+    min_altitude: float = 1.0
+    max_altitude: float = 60.0
+    """Lowest and highest z of the aircraft's centre in the world, metres."""
+    climb_angle: float = math.radians(45.0)
+    descend_angle: float = math.radians(45.0)
+    """Steepest path above and below the horizon, radians; 90 degrees is no limit."""
+    snap_distance: float = 3.0
+    """A goal moves at most this far to free space, metres."""
+    max_distance: float = 200.0
+    """Targets farther than this are not looked for, metres."""
+
+    def __post_init__(self) -> None:
+        if not -math.inf < self.min_altitude < self.max_altitude < math.inf:
+            raise ValueError("altitudes must be finite, the lower one first")
+        for angle in (self.climb_angle, self.descend_angle):
+            if not 0.01 < angle <= 0.5 * math.pi + 1e-9:
+                raise ValueError("angles of climb and descent must lie in (0.01, pi / 2] radians")
+        if not (0.0 <= self.snap_distance < math.inf and 0.0 < self.max_distance < math.inf):
+            raise ValueError("distances must be finite and not negative")
+
+    @property
+    def slopes(self) -> Slopes:
+        """What the kernels need to know of the angles."""
+        return slopes_of(self.climb_angle, self.descend_angle)
+
+
+@dataclass(frozen=True, eq=False)
+class FlightPlan(Message):
+    """A path, or the reason why there is none."""
+
+    p_WP: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    """(k, 3) float64, metres in the world, from the aircraft to the snapped goal."""
+    length: float = 0.0
+    """Metres."""
+    reason: str = ""
+
+
+def make_flight_plan(
+    space: FlightSpace,
+    *,
+    position: Point,
+    target: Point,
+    viewpoint: Point,
+    goal: Point | None = None,
+    parameters: FlightParameters,
+) -> FlightPlan:
+    """Returns a plan to the free space nearest to a target.
+
+    It is searched in a box around aircraft and target, and when there is no way in it, in a much
+    larger one.  Unknown space is taken to be free.
+
+    Args:
+        space: where the aircraft may fly.
+        position: (x, y, z) of the aircraft, metres in the world.
+        target: the selected point.
+        viewpoint: from where the target was seen.
+        goal: the goal snapped before; kept while it is free and there is a way.
+        parameters: size and limits.
+    """
+    if not np.isfinite([*position, *target, *viewpoint]).all():
+        return FlightPlan(reason="a position is not finite")
+    if math.dist(position, target) > parameters.max_distance:
+        return FlightPlan(reason=f"farther than {parameters.max_distance:g} m")
+    voxels = math.dist(position, target) / space.voxels.resolution
+    reason = ""
+    for margin in (max(24, int(0.4 * voxels)), max(200, int(1.5 * voxels))):
+        window = _window(space, (position, target), margin, parameters)
+        if window is None:
+            return FlightPlan(reason=reason or "too many voxels")
+        start = way_out(space, window, position, _escape(position, parameters))
+        if start is None:
+            return FlightPlan(reason=NO_WAY_OUT)
+        plan = _plan_in(space, window, start, position, target, viewpoint, goal, parameters)
+        if not plan.reason:
+            return plan
+        reason = plan.reason
+        if reason not in (UNREACHABLE, TOO_STEEP):
+            break
+    return FlightPlan(reason=reason)
+
+
+def _plan_in(
+    space: FlightSpace,
+    window: FlightWindow,
+    start: NDArray[np.float64],
+    position: Point,
+    target: Point,
+    viewpoint: Point,
+    goal: Point | None,
+    parameters: FlightParameters,
+) -> FlightPlan:
+    """Returns the plan within one window."""
+
+    def end_in(free: FlightWindow) -> NDArray[np.float64] | None:
+        return snap_goal(
+            space,
+            free,
+            target=target,
+            position=position,
+            viewpoint=viewpoint,
+            max_distance=parameters.snap_distance,
+        )
+
+    end = None if goal is None else window.point(goal)
+    if end is None or window.is_blocked(end):
+        end = end_in(window)
+    if end is None:
+        return FlightPlan(reason=f"no free space within {parameters.snap_distance:g} m")
+    nodes = route(window, start, end, parameters.slopes)
+    if not len(nodes):
+        within_reach = reachable(window, start)
+        was_within_reach = not within_reach.is_blocked(end)
+        end = end_in(within_reach)
+        if end is None:
+            return FlightPlan(reason=UNREACHABLE)
+        nodes = route(window, start, end, parameters.slopes)
+        if not len(nodes):
+            return FlightPlan(reason=TOO_STEEP if was_within_reach else UNREACHABLE)
+    p_WP = window.world(unfold(window.words, nodes, parameters.slopes))
+    if math.dist(p_WP[0], position) > 1e-9:
+        p_WP = np.concatenate((np.array([position]), p_WP))
+    return FlightPlan(p_WP, float(np.linalg.norm(np.diff(p_WP, axis=0), axis=1).sum()))
+
+
+def route(
+    window: FlightWindow,
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64],
+    slopes: Slopes,
+) -> NDArray[np.float64]:
+    """Returns the (k, 3) nodes of a short path between two free points of a window, in voxels.
+
+    Empty when there is none.  Edges steeper than the limits are flown as switchbacks, see
+    :func:`unfold`.
+    """
+    words = window.words
+    if edge(words, start, goal, slopes) >= 0:
+        return np.stack((start, goal))
+    for size in SIZES:
+        # Before anything costly: is there a way at all?
+        if size == SIZES[-1] and reachable(window, start).is_blocked(goal):
+            break
+        outcome, nodes = any_angle_path(words, start, goal, slopes, size)
+        if outcome != TOO_LARGE:
+            break
+    if outcome != FOUND:
+        return np.zeros((0, 3))
+    nodes = shorten(words, nodes, slopes, ROUNDS)
+    if path_cost(nodes, slopes) > NEAR:
+        nodes = shorten(words, visibility_path(words, nodes, slopes), slopes, ROUNDS)
+    return nodes
+
+
+def _escape(position: Point, parameters: FlightParameters) -> float:
+    """Returns how far from the aircraft a free voxel is looked for, metres."""
+    keep = parameters.clearance
+    below = max(parameters.min_altitude - position[2], position[2] - parameters.max_altitude, 0.0)
+    return below + keep.radius + max(keep.ground_margin, keep.ceiling_margin, 1.0) + 1.0
+
+
+def _window(
+    space: FlightSpace, points: tuple[Point, ...], margin: int, parameters: FlightParameters
+) -> FlightWindow | None:
+    """Returns the window around some points, or None if it would be too large."""
+    resolution = space.voxels.resolution
+    cells = np.floor(np.array(points) / resolution).astype(np.int64)
+    floor = math.ceil(parameters.min_altitude / resolution - 1e-9)
+    ceiling = math.floor(parameters.max_altitude / resolution + 1e-9)
+    lowest, highest = cells.min(axis=0), cells.max(axis=0) + 1
+    x0, y0, z0 = (int(value) for value in lowest - margin)
+    x1, y1, z1 = (int(value) for value in highest + margin)
+    try:
+        return make_window(
+            space.blocked,
+            low=(x0, y0, max(z0, min(floor, int(lowest[2])))),
+            high=(x1, y1, min(z1, max(ceiling, int(highest[2])))),
+            resolution=resolution,
+            floor=floor,
+            ceiling=ceiling,
+        )
+    except ValueError:
+        return None
+
+
+def path_is_blocked(space: FlightSpace, p_WP: NDArray[np.float64], *, position: Point) -> bool:
+    """Returns whether the rest of a path leads through blocked voxels; (k, 3) metres.
+
+    An aircraft that is in a blocked voxel itself is on its way out: that is no news.
+    """
+    _, ahead = remaining_way(p_WP, position)
+    rest = np.concatenate((np.array([position]), p_WP[ahead:]))
+    cells = np.floor(rest / space.voxels.resolution).astype(np.int64)
+    low, high = cells.min(axis=0) - 1, cells.max(axis=0) + 2
+    window = make_window(
+        space.blocked,
+        low=(int(low[0]), int(low[1]), int(low[2])),
+        high=(int(high[0]), int(high[1]), int(high[2])),
+        resolution=space.voxels.resolution,
+    )
+    points = np.stack([window.point((x, y, z)) for x, y, z in rest])
+    return bool(_touches(window.words, points, 1 if window.is_blocked(points[0]) else 0))
+
+
+@kernel
+def _touches(words: NDArray[np.uint32], points: NDArray[np.float64], first: int) -> bool:
+    for k in range(first, len(points) - 1):
+        a, b = points[k], points[k + 1]
+        if not sees(words, a[0], a[1], a[2], b[0], b[1], b[2]):
+            return True
+    return False
+
+
+def remaining_way(p_WP: NDArray[np.float64], position: Point) -> tuple[float, int]:
+    """Returns the way to the end of a (k, 3) polyline, entered at its nearest point, metres.
+
+    Also the index of the first point that still lies ahead.
+    """
+    if len(p_WP) < 2:
+        return (math.dist(p_WP[-1], position), 0) if len(p_WP) else (0.0, 0)
+    remaining, ahead = _remaining(frozen_view(p_WP, np.float64), np.array(position))
+    return float(remaining), int(ahead)
+
+
+@kernel
+def _remaining(points: NDArray[np.float64], p: NDArray[np.float64]) -> tuple[float, int]:
+    best, remaining, beyond, index = np.inf, 0.0, 0.0, len(points) - 1
+    for k in range(len(points) - 2, -1, -1):
+        step = points[k + 1] - points[k]
+        squared = np.sum(step * step)
+        t = min(max(np.sum((p - points[k]) * step) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
+        off = math.sqrt(np.sum((points[k] + t * step - p) ** 2))
+        if off < best:
+            best, index = off, k + 1
+            remaining = off + (1.0 - t) * math.sqrt(squared) + beyond
+        beyond += math.sqrt(squared)
+    return remaining, index
+
+
+def warm_up() -> None:
+    """Compiles every kernel of flight planning, or loads it from numba's cache."""
+    for module in (
+        visibility_lines,
+        visibility_space,
+        visibility_window,
+        visibility_any_angle,
+        visibility_graph,
+        visibility_snapping,
+    ):
+        module.warm_up()
+    points = np.array([[1.5, 1.5, 1.5], [2.5, 1.5, 1.5]])
+    remaining_way(points, (1.0, 1.0, 1.0))
+    _touches(np.zeros((4, 4, 1), np.uint32), points, 0)

@@ -1,0 +1,252 @@
+"""Lazy any-angle search (Nash, Koenig and Tovey 2010, Lazy Theta*) through a window.
+
+A node takes over its neighbour's parent as if it saw it; whether it does is looked up only when
+the node is expanded, so there is one line of sight for each expanded node instead of one for each
+edge.  Nodes are kept in a table of hashes: a search costs what it touches, however large the
+window is.
+
+The way that remains counts ``GREED`` times (Pohl 1970), and the search ends at the first node that
+sees the goal: a hundredth of the nodes are expanded, and the path, once shortened, is hardly
+longer.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.kernels import inlined_kernel, kernel
+from unilavira_drake.planning.visibility_lines import Slopes, edge, edge_cost
+
+FOUND, UNREACHABLE, TOO_LARGE = 0, 1, 2
+
+GREED = 1.5
+
+
+def _boxes() -> NDArray[np.int64]:
+    """Returns, for each of 27 steps, the voxels that must be free: bit 9 x + 3 y + z."""
+    masks = np.zeros(27, np.int64)
+    for step in range(27):
+        reach = [
+            range(min(d, 0), max(d, 0) + 1)
+            for d in (step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1)
+        ]
+        for x in reach[0]:
+            for y in reach[1]:
+                for z in reach[2]:
+                    masks[step] |= 1 << (9 * (x + 1) + 3 * (y + 1) + z + 1)
+    return masks
+
+
+_BOXES = _boxes()
+_CENTER = 13
+
+
+def any_angle_path(
+    words: NDArray[np.uint32],
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64],
+    slopes: Slopes,
+    capacity: int,
+) -> tuple[int, NDArray[np.float64]]:
+    """Returns whether there is a path, and its (k, 3) nodes from start to goal.
+
+    Args:
+        words: blocked bits of a window with a blocked border.
+        start: point of the window in a free voxel, voxels.
+        goal: likewise.
+        slopes: of :func:`slopes_of`.
+        capacity: most nodes, a power of two; beyond, the outcome is ``TOO_LARGE``.
+    """
+    outcome, nodes = _search(words, start, goal, slopes, capacity)
+    return int(outcome), nodes
+
+
+@inlined_kernel
+def _slot(table: NDArray[np.int32], cells: NDArray[np.int64], cell: int) -> int:
+    """Returns where a cell is, or belongs, in the table."""
+    mask = len(table) - 1
+    slot = (cell * 0x9E3779B1 >> 7) & mask
+    while table[slot] >= 0 and cells[table[slot]] != cell:
+        slot = (slot + 1) & mask
+    return slot
+
+
+@inlined_kernel
+def _push(
+    keys: NDArray[np.float64], heap: NDArray[np.int32], n: int, key: float, node: int
+) -> None:
+    at = n
+    while at > 0:
+        up = (at - 1) >> 1
+        if keys[up] <= key:
+            break
+        keys[at], heap[at] = keys[up], heap[up]
+        at = up
+    keys[at], heap[at] = key, node
+
+
+@inlined_kernel
+def _pop(keys: NDArray[np.float64], heap: NDArray[np.int32], n: int) -> int:
+    """Returns the first node of a heap of n, and leaves a heap of n - 1."""
+    node = heap[0]
+    key, last = keys[n - 1], heap[n - 1]
+    at = 0
+    while True:
+        child = 2 * at + 1
+        if child >= n - 1:
+            break
+        if child + 1 < n - 1 and keys[child + 1] < keys[child]:
+            child += 1
+        if keys[child] >= key:
+            break
+        keys[at], heap[at] = keys[child], heap[child]
+        at = child
+    keys[at], heap[at] = key, last
+    return node
+
+
+@inlined_kernel
+def _free_around(words: NDArray[np.uint32], x: int, y: int, z: int) -> int:
+    """Returns the 27 bits of the free voxels around one."""
+    free = 0
+    word, shift = z >> 5, z & 31
+    for i in range(3):
+        for j in range(3):
+            bits = np.int64(words[x + i - 1, y + j - 1, word])
+            if shift == 0:
+                below = np.int64(words[x + i - 1, y + j - 1, word - 1])
+                three = (bits << 1 | below >> 31) & 7
+            elif shift == 31:
+                above = np.int64(words[x + i - 1, y + j - 1, word + 1])
+                three = (bits >> 30 | above << 2) & 7
+            else:
+                three = bits >> (shift - 1) & 7
+            free |= (three ^ 7) << (9 * i + 3 * j)
+    return free
+
+
+@kernel
+def _settle(
+    words: NDArray[np.uint32],
+    node: int,
+    near: int,
+    points: NDArray[np.float64],
+    costs: NDArray[np.float64],
+    parents: NDArray[np.int32],
+    closed: NDArray[np.bool_],
+    table: NDArray[np.int32],
+    cells: NDArray[np.int64],
+    slopes: Slopes,
+) -> bool:
+    """Checks the way from a node's parent, takes that from the best neighbour if it is blocked.
+
+    Returns whether there is a way; ``near`` are the 27 bits of free voxels around the node.
+    """
+    if edge(words, points[parents[node]], points[node], slopes) >= 0:
+        return True
+    across_y, across_x = 32 * words.shape[2], 32 * words.shape[2] * words.shape[1]
+    costs[node] = np.inf
+    for step in range(27):
+        if step == _CENTER or near & _BOXES[step] != _BOXES[step]:
+            continue
+        shift = (step // 9 - 1) * across_x + (step // 3 % 3 - 1) * across_y + step % 3 - 1
+        other = table[_slot(table, cells, cells[node] + shift)]
+        if other < 0 or not closed[other]:
+            continue
+        cost = costs[other] + edge_cost(points[other], points[node], slopes)
+        if cost < costs[node] and edge(words, points[other], points[node], slopes) >= 0:
+            costs[node], parents[node] = cost, other
+    return costs[node] < np.inf
+
+
+@kernel
+def _search(
+    words: NDArray[np.uint32],
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64],
+    slopes: Slopes,
+    capacity: int,
+) -> tuple[int, NDArray[np.float64]]:
+    nz = 32 * words.shape[2]
+    across_y, across_x = nz, nz * words.shape[1]
+    points = np.empty((capacity, 3))
+    costs, cells = np.empty(capacity), np.empty(capacity, np.int64)
+    parents, closed = np.empty(capacity, np.int32), np.zeros(capacity, np.bool_)
+    table = np.full(2 * capacity, -1, np.int32)
+    keys, heap = np.empty(4 * capacity), np.empty(4 * capacity, np.int32)
+    first = math.floor(start[0]) * across_x + math.floor(start[1]) * across_y + math.floor(start[2])
+    last = math.floor(goal[0]) * across_x + math.floor(goal[1]) * across_y + math.floor(goal[2])
+    points[0], costs[0], cells[0], parents[0] = start, 0.0, first, 0
+    table[_slot(table, cells, first)] = 0
+    _push(keys, heap, 0, edge_cost(start, goal, slopes), 0)
+    waiting, count = 1, 1
+    while waiting > 0:
+        node = _pop(keys, heap, waiting)
+        waiting -= 1
+        if closed[node]:
+            continue
+        cell = cells[node]
+        x, y, z = cell // across_x, cell // nz % words.shape[1], cell % nz
+        near = _free_around(words, x, y, z)
+        if node > 0 and not _settle(
+            words, node, near, points, costs, parents, closed, table, cells, slopes
+        ):
+            continue
+        closed[node] = True
+        if cell == last or edge(words, points[node], goal, slopes) >= 0:
+            return FOUND, _traced(points, parents, node, goal)
+        if count + 27 > capacity or waiting + 27 > 4 * capacity:
+            return TOO_LARGE, points[:0]
+        parent = parents[node]
+        for step in range(27):
+            if near & _BOXES[step] != _BOXES[step] or step == _CENTER:
+                continue
+            sx, sy, sz = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1
+            slot = _slot(table, cells, cell + sx * across_x + sy * across_y + sz)
+            other = table[slot]
+            if other < 0:
+                other = count
+                count += 1
+                table[slot], cells[other] = other, cell + sx * across_x + sy * across_y + sz
+                points[other, 0], points[other, 1], points[other, 2] = (
+                    x + sx + 0.5, y + sy + 0.5, z + sz + 0.5,
+                )  # fmt: skip
+                if cells[other] == last:
+                    points[other] = goal
+                costs[other], parents[other] = np.inf, -1
+            if closed[other]:
+                continue
+            cost = costs[parent] + edge_cost(points[parent], points[other], slopes)
+            if cost < costs[other]:
+                costs[other], parents[other] = cost, parent
+                remaining = GREED * edge_cost(points[other], goal, slopes)
+                _push(keys, heap, waiting, cost + remaining, other)
+                waiting += 1
+    return UNREACHABLE, points[:0]
+
+
+@kernel
+def _traced(
+    points: NDArray[np.float64], parents: NDArray[np.int32], node: int, goal: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Returns the nodes from the start over a node to the goal."""
+    n, at = 2, node
+    while at != 0:
+        at = parents[at]
+        n += 1
+    nodes = np.empty((n, 3))
+    nodes[n - 1] = goal
+    at = node
+    for k in range(n - 2, -1, -1):
+        nodes[k] = points[at]
+        at = parents[at]
+    return nodes
+
+
+def warm_up() -> None:
+    """Compiles the kernels, or loads them from numba's cache."""
+    words = np.full((4, 5, 1), 0xFFFFFFF9, np.uint32)
+    any_angle_path(words, np.array([1.5, 1.5, 1.5]), np.array([2.5, 3.5, 1.5]), np.ones(4), 64)

@@ -1,0 +1,293 @@
+"""The flight planner: snaps goals, plans and replans in 3-D, and says how the flight ends."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from typing import Any
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from unilavira_drake.messages import Goal, Message, NavigationStatus, Path, VoxelMap
+from unilavira_drake.planning.polyline import final_heading
+from unilavira_drake.planning.visibility import (
+    FlightParameters,
+    FlightPlan,
+    Point,
+    make_flight_plan,
+    path_is_blocked,
+    remaining_way,
+    warm_up,
+)
+from unilavira_drake.planning.visibility_space import Clearance, FlightSpace, update_space
+from unilavira_drake.ports import Level, message_input, pose_input
+
+PROGRESS = 0.1
+"""The way that remains must shrink by this much to count as progress, metres."""
+
+BUDGET_BASE = 10.0
+"""Travel that is always granted beyond the planned length times the travel factor, metres."""
+
+FINAL_STRETCH = 2.0
+"""Nearer to the goal than this only a blocked way is planned anew, metres."""
+
+
+@dc.dataclass(frozen=True, eq=False)
+class VisibilityPlannerState(Message):
+    """Status and path of one goal, and what it takes to watch its progress."""
+
+    status: NavigationStatus = NavigationStatus()
+    path: Path = dc.field(default_factory=Path)
+    heading: float | None = None
+    target: Point = (0.0, 0.0, 0.0)
+    """The selected point before snapping, metres."""
+    viewpoint: Point = (0.0, 0.0, 0.0)
+    """Where the aircraft was when the goal was given, metres."""
+    space: FlightSpace = dc.field(default_factory=FlightSpace)
+    """Where it may fly, by the latest map that was looked at."""
+    map_version: int = 0
+    """Version of the map of the latest plan."""
+    plan_time: float = 0.0
+    progress_time: float = 0.0
+    least_remaining: float = math.inf
+    position: Point = (0.0, 0.0, 0.0)
+    """Where travel was last added up, metres."""
+    travelled: float = 0.0
+    budget: float = 0.0
+
+
+class VisibilityPlanner(Level):
+    """Plans through free space to each goal and reports ``arrived`` or ``failed`` with the reason.
+
+    Goal n is taken up once the map holds panorama n.  Unknown space is taken to be free.  While
+    the aircraft moves, the way is planned anew when a new map blocks it, or when the map changed,
+    the plan is ``replan_period`` old and the goal is not near.  ``path`` carries (k, 3) points.
+    Reasons of failure: the goal's own, ``unreachable``, ``no free space within ... m``, ``no free
+    space around the aircraft``, ``no way within the limits of climb and descent``, ``farther than
+    ... m``, ``stuck``, ``travel budget``, and numbers that are none.
+
+    .. pydrake_system::
+
+        name: VisibilityPlanner
+        input_ports:
+        - voxel_map
+        - pose_estimate
+        - goal
+        output_ports:
+        - path
+        - navigation_status
+
+    Args:
+        radius: kept free around the aircraft's centre, metres.
+        ground_margin: kept free below it, metres.
+        ceiling_margin: kept free above it, metres.
+        min_altitude: lowest z of its centre in the world, metres.
+        max_altitude: highest z of its centre in the world, metres.
+        climb_angle: steepest path above the horizon, radians; pi / 2 is no limit.
+        descend_angle: steepest path below the horizon, radians.
+        snap_distance: a goal moves at most this far to free space, metres.
+        max_distance: goals farther than this are refused, metres.
+        tolerance: arrived within this distance of the snapped goal, metres.
+        stuck_time: stuck after this long without progress, seconds.
+        travel_factor: fails after this many times the planned length plus 10 m.
+        replan_period: seconds between two plans while nothing blocks the way.
+        period: seconds between two polls.
+
+    Raises:
+        ValueError: if a number makes no sense.
+    """
+
+    def __init__(
+        self,
+        *,
+        radius: float = 0.5,
+        ground_margin: float = 1.0,
+        ceiling_margin: float = 0.5,
+        min_altitude: float = 1.0,
+        max_altitude: float = 60.0,
+        climb_angle: float = math.radians(45.0),
+        descend_angle: float = math.radians(45.0),
+        snap_distance: float = 3.0,
+        max_distance: float = 200.0,
+        tolerance: float = 0.5,
+        stuck_time: float = 6.0,
+        travel_factor: float = 3.0,
+        replan_period: float = 1.0,
+        period: float = 0.1,
+    ) -> None:
+        self._parameters = FlightParameters(
+            clearance=Clearance(radius, ground_margin, ceiling_margin),
+            min_altitude=min_altitude,
+            max_altitude=max_altitude,
+            climb_angle=climb_angle,
+            descend_angle=descend_angle,
+            snap_distance=snap_distance,
+            max_distance=max_distance,
+        )
+        space = FlightSpace(clearance=self._parameters.clearance)
+        super().__init__(VisibilityPlannerState(path=_no_path(0), space=space), period=period)
+        self._tolerance = tolerance
+        self._stuck_time = stuck_time
+        self._travel_factor = travel_factor
+        self._replan_period = replan_period
+        self._map = message_input(self, "voxel_map", VoxelMap())
+        self._pose = pose_input(self, "pose_estimate")
+        self._goal = message_input(self, "goal", Goal())
+        self.declare_output("path", lambda state: state.path, _no_path(0))
+        self.declare_output("navigation_status", lambda state: state.status, NavigationStatus())
+        warm_up()
+
+    def step(self, context: Context, state: Any) -> Any:
+        """Returns the state after a new goal, a new map or some way flown; see the class."""
+        time = context.get_time()
+        if not state.status.terminal:
+            return self._follow(state, self._map(context), self._position(context), time)
+        goal = self._goal(context)
+        if goal.n <= state.status.n:
+            return state
+        voxels = self._map(context)
+        if voxels.n < goal.n:
+            return state
+        if goal.kind == "stay":
+            return _done(state, goal.n, "arrived", "", goal.heading)
+        if goal.kind != "go" or goal.p_WG is None:
+            return _done(state, goal.n, "failed", goal.reason, None)
+        return self._begin(goal, state, voxels, self._position(context), time)
+
+    def _position(self, context: Context) -> Point:
+        x, y, z = self._pose(context).translation()
+        return (float(x), float(y), float(z))
+
+    def _begin(
+        self,
+        goal: Goal,
+        state: VisibilityPlannerState,
+        voxels: VoxelMap,
+        position: Point,
+        time: float,
+    ) -> VisibilityPlannerState:
+        assert goal.p_WG is not None
+        if len(goal.p_WG) != 3:
+            return _done(state, goal.n, "failed", "the goal is not a point in space", None)
+        fresh = VisibilityPlannerState(
+            status=NavigationStatus(goal.n, "moving"),
+            path=_no_path(0),
+            heading=goal.heading,
+            target=goal.p_WG,
+            viewpoint=position,
+            space=state.space,
+            progress_time=time,
+            position=position,
+        )
+        return self._planned(fresh, voxels, position, None, time)
+
+    def _planned(
+        self,
+        state: VisibilityPlannerState,
+        voxels: VoxelMap,
+        position: Point,
+        goal: Point | None,
+        time: float,
+    ) -> VisibilityPlannerState:
+        n = state.status.n
+        try:
+            state = dc.replace(state, space=update_space(state.space, voxels))
+        except ValueError as error:
+            return _done(state, n, "failed", str(error), None)
+        plan = make_flight_plan(
+            state.space,
+            position=position,
+            target=state.target,
+            viewpoint=state.viewpoint,
+            goal=goal,
+            parameters=self._parameters,
+        )
+        return self._with_plan(state, plan, voxels, time)
+
+    def _with_plan(
+        self, state: VisibilityPlannerState, plan: FlightPlan, voxels: VoxelMap, time: float
+    ) -> VisibilityPlannerState:
+        n = state.status.n
+        if plan.reason:
+            return _done(state, n, "failed", plan.reason, None)
+        if plan.length <= self._tolerance:
+            return _done(state, n, "arrived", "", state.heading)
+        version = state.path.version + 1 if state.path.n == n else 0
+        return dc.replace(
+            state,
+            path=Path(n, version, plan.p_WP),
+            map_version=voxels.version,
+            plan_time=time,
+            # Not the time of progress: replanning alone must not hide that it is stuck.
+            least_remaining=plan.length,
+            budget=max(state.budget, self._travel_factor * plan.length + BUDGET_BASE),
+        )
+
+    def _follow(
+        self, state: VisibilityPlannerState, voxels: VoxelMap, position: Point, time: float
+    ) -> VisibilityPlannerState:
+        n, late = state.status.n, time - state.progress_time > self._stuck_time
+        if not all(map(math.isfinite, position)):
+            return _done(state, n, "failed", "the pose is not finite", None) if late else state
+        x, y, z = (float(value) for value in state.path.p_WP[-1])
+        if math.dist(position, (x, y, z)) <= self._tolerance:
+            heading = _arrival(state.path) if state.heading is None else state.heading
+            return _done(state, n, "arrived", "", heading)
+        step = math.dist(position, state.position)
+        if step >= PROGRESS:
+            state = dc.replace(state, travelled=state.travelled + step, position=position)
+        if state.travelled > state.budget:
+            return _done(state, n, "failed", "travel budget", None)
+        remaining, _ = remaining_way(state.path.p_WP, position)
+        if remaining <= state.least_remaining - PROGRESS:
+            state = dc.replace(state, least_remaining=remaining, progress_time=time)
+        elif late:
+            return _done(state, n, "failed", "stuck", None)
+        return self._replanned(state, voxels, position, (x, y, z), time)
+
+    def _replanned(
+        self,
+        state: VisibilityPlannerState,
+        voxels: VoxelMap,
+        position: Point,
+        goal: Point,
+        time: float,
+    ) -> VisibilityPlannerState:
+        if voxels.version == state.map_version:
+            return state
+        due = time - state.plan_time >= self._replan_period - 1e-9
+        due = due and math.dist(position, goal) > FINAL_STRETCH
+        if due:
+            return self._planned(state, voxels, position, goal, time)
+        if voxels is state.space.voxels:
+            return state
+        try:
+            space = update_space(state.space, voxels)
+        except ValueError as error:
+            return _done(state, state.status.n, "failed", str(error), None)
+        state = dc.replace(state, space=space)
+        if not path_is_blocked(space, state.path.p_WP, position=position):
+            return state
+        return self._planned(state, voxels, position, goal, time)
+
+
+def _arrival(path: Path) -> float | None:
+    """Returns the yaw in which a path ends; None if it only rises or falls."""
+    flat = path.p_WP[:, :2]
+    if float(np.ptp(flat, axis=0).max()) < PROGRESS:
+        return None
+    return final_heading(flat)
+
+
+def _no_path(n: int) -> Path:
+    return Path(n, p_WP=np.zeros((0, 3)))
+
+
+def _done(
+    state: VisibilityPlannerState, n: int, outcome: str, reason: str, heading: float | None
+) -> VisibilityPlannerState:
+    """Returns the terminal state of goal n: its status and the empty path, in one message."""
+    return VisibilityPlannerState(
+        status=NavigationStatus(n, outcome, reason, heading), path=_no_path(n), space=state.space
+    )
