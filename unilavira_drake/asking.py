@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-from unilavira_drake.errors import MllmError, ReplyFormatError, ReplyRefused, ReplyTruncated
+from unilavira_drake.errors import MllmError, ReplyFormatError
 from unilavira_drake.language.reply import parse_language_reply
 from unilavira_drake.messages import LanguageAction, VisionAction
 from unilavira_drake.mllm.reply import Completion, Mllm
@@ -47,14 +47,10 @@ def ask(
         except (MllmError, ReplyFormatError) as error:
             attempts += error.attempts
             error.attempts = attempts
-            if not _worth_a_reask(error) or request.attempt >= MAX_REASKS:
+            hopeless = isinstance(error, MllmError) or not error.worth_a_reask
+            if hopeless or request.attempt >= MAX_REASKS:
                 raise
             request = dataclasses.replace(request, attempt=request.attempt + 1, feedback=str(error))
-
-
-def _worth_a_reask(error: MllmError | ReplyFormatError) -> bool:
-    final = (ReplyRefused, ReplyTruncated)
-    return isinstance(error, ReplyFormatError) and not isinstance(error, final)
 
 
 def _parsed(text: str, request: MllmRequest) -> LanguageAction | VisionAction:

@@ -100,6 +100,9 @@ class CassetteError(MllmError):
 class ReplyFormatError(UniLaviraError):
     """A model's reply does not have the form that was asked for."""
 
+    worth_a_reask = True
+    """Whether the model may do better when it is told what was wrong."""
+
     attempts: tuple[Any, ...] = ()
     """The ``mllm.reply.Attempt`` of each request on the wire, when a backend raises it."""
     latency: float | None = None
@@ -107,11 +110,15 @@ class ReplyFormatError(UniLaviraError):
 
 
 class ReplyTruncated(ReplyFormatError):
-    """A reply was cut off at the limit of tokens."""
+    """A reply was cut off at the limit of tokens, also where twice as many were allowed."""
+
+    worth_a_reask = False
 
 
 class ReplyRefused(ReplyFormatError):
     """The model, or its provider's filter, refused to answer."""
+
+    worth_a_reask = False
 
 
 class PortTypeError(UniLaviraError, TypeError):

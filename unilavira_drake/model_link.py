@@ -121,6 +121,7 @@ class ModelLink(Level):
             usage=outcome.usage if isinstance(outcome, Completion) else paid(outcome.attempts),
             latency=round(state.t_visible - state.t_issue, 9),
             infrastructure=isinstance(outcome, MllmError),
+            unusable=isinstance(outcome, ReplyFormatError) and outcome.worth_a_reask,
         )
         usage = state.usage.after(
             reply,

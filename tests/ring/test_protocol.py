@@ -18,7 +18,7 @@ from dummy_levels import (
 )
 from pydrake.systems.analysis import Simulator
 
-from unilavira_drake.errors import ReplyRefused
+from unilavira_drake.errors import ReplyFormatError, ReplyRefused
 from unilavira_drake.language.system import Language
 from unilavira_drake.memory.todo_system import TodoMemory
 from unilavira_drake.memory.waypoint_system import WaypointMemory
@@ -203,6 +203,36 @@ def test_a_refusal_is_not_asked_again() -> None:
     assert language.request(3).variables.outcome.startswith("failed: model error: ReplyRefused")
     assert [r.attempt for r in vision.requests] == [0]
     assert language.request(4).variables.outcome.startswith("failed: no target")
+
+
+class SilentOnce(ScriptedModel):
+    """Says nothing at its first attempt at one number, as a model does that only thinks."""
+
+    silent = 2
+
+    def complete(self, request: MllmRequest) -> Completion:
+        completion = super().complete(request)
+        if (request.n, request.attempt) == (self.silent, 0):
+            raise ReplyFormatError("the reply is empty.")
+        return completion
+
+
+def test_an_empty_reply_is_asked_again() -> None:
+    language = SilentOnce(
+        {
+            1: plan("go"),
+            2: decide("turn", direction="front"),
+            3: decide("double_check"),
+            4: verdict(True),
+        }
+    )
+    vision = SilentOnce({}, select())
+    run_until_stop(make_ring(language, vision))
+    for model in (language, vision):
+        again = [r for r in model.requests if r.n == 2]
+        assert [r.attempt for r in again] == [0, 1]
+        assert again[1].feedback == "ReplyFormatError: the reply is empty."
+    assert language.request(3).variables.outcome == "arrived"
 
 
 def test_unusable_plan_becomes_the_task_itself() -> None:

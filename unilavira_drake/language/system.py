@@ -142,17 +142,17 @@ class Language(Level):
         return dataclasses.replace(state, request=request)
 
     def _conclude(self, state: LanguageState, reply: MllmReply) -> LanguageState:
-        request = state.request
-        if reply.error:
-            return dataclasses.replace(state, action=safe_action(request, reply.error))
-        try:
-            action = parse_language_reply(reply.text, request)
-        except ReplyFormatError as error:
-            if request.attempt >= MAX_REASKS:
-                return dataclasses.replace(state, action=safe_action(request, str(error)))
-            again = dataclasses.replace(request, attempt=request.attempt + 1, feedback=str(error))
+        request, problem = state.request, reply.error
+        if not problem:
+            try:
+                action = parse_language_reply(reply.text, request)
+                return dataclasses.replace(state, action=action)
+            except ReplyFormatError as error:
+                problem = str(error)
+        if request.attempt < MAX_REASKS and (reply.unusable or not reply.error):
+            again = dataclasses.replace(request, attempt=request.attempt + 1, feedback=problem)
             return dataclasses.replace(state, request=again)
-        return dataclasses.replace(state, action=action)
+        return dataclasses.replace(state, action=safe_action(request, problem))
 
 
 def safe_action(request: MllmRequest, problem: str) -> LanguageAction:

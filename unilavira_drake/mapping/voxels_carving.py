@@ -9,6 +9,7 @@ number of rays that pass (Hornung et al. 2013, OctoMap).
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,24 +68,20 @@ def sample(
 def _nearest_around(sights: NDArray[np.float64]) -> None:
     """Replaces each sight by the least of the 3 x 3 around it; 0 is none and stays 0."""
     rows, columns = sights.shape
-    across = np.empty((3, columns))
-    for a in range(rows + 1):
-        if a < rows:
-            for b in range(columns):
-                least = np.inf
-                for c in range(max(b - 1, 0), min(b + 2, columns)):
-                    if sights[a, c] > 0.0:
-                        least = min(least, sights[a, c])
-                across[a % 3, b] = least
-        if a > 0:
-            for b in range(columns):
-                if sights[a - 1, b] > 0.0:
-                    least = across[(a - 1) % 3, b]
-                    if a > 1:
-                        least = min(least, across[(a - 2) % 3, b])
-                    if a < rows:
-                        least = min(least, across[a % 3, b])
-                    sights[a - 1, b] = least
+    across = np.full((rows + 2, columns), np.inf)
+    for a in range(rows):
+        before = here = np.inf
+        for b in range(columns):
+            if sights[a, b] <= 0.0:
+                sights[a, b] = np.inf
+        for b in range(columns):
+            before, here = here, sights[a, b]
+            after = sights[a, b + 1] if b + 1 < columns else np.inf
+            across[a + 1, b] = min(before, here, after)
+    for a in range(rows):
+        for b in range(columns):
+            least = min(across[a, b], across[a + 1, b], across[a + 2, b])
+            sights[a, b] = least if sights[a, b] < np.inf else 0.0
 
 
 @inlined_kernel
@@ -199,7 +196,7 @@ def apply(old: NDArray[np.int8], stamps: NDArray[np.uint8], new: NDArray[np.int8
                 stamp = stamps[i, j, k]
                 step = HIT_STEP if stamp == HIT else FREE_STEP if stamp == FREE else 0
                 was = np.int16(old[i, j, k])
-                value = min(max(was + np.int16(step), LOWEST), HIGHEST)
+                value: Any = min(max(was + np.int16(step), LOWEST), HIGHEST)
                 if value == 0 and step != 0:
                     value = 1 if step > 0 else -1
                 new[i, j, k] = value

@@ -82,6 +82,9 @@ class MllmReply(Message):
     """Simulated seconds from request to reply."""
     infrastructure: bool = False
     """Whether the error is the machine's or the service's: the episode ends, never scored."""
+    unusable: bool = False
+    """Whether the model replied, but with nothing that can be read: worth asking once more, unlike
+    a refusal or a reply that was cut off."""
 
 
 class Mllm(Protocol):

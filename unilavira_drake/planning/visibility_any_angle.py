@@ -13,6 +13,7 @@ longer.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +90,7 @@ def _push(
 
 
 @inlined_kernel
-def _pop(keys: NDArray[np.float64], heap: NDArray[np.int32], n: int) -> int:
+def _pop(keys: NDArray[np.float64], heap: NDArray[np.int32], n: int) -> Any:
     """Returns the first node of a heap of n, and leaves a heap of n - 1."""
     node = heap[0]
     key, last = keys[n - 1], heap[n - 1]
@@ -109,9 +110,9 @@ def _pop(keys: NDArray[np.float64], heap: NDArray[np.int32], n: int) -> int:
 
 
 @inlined_kernel
-def _free_around(words: NDArray[np.uint32], x: int, y: int, z: int) -> int:
+def _free_around(words: NDArray[np.uint32], x: int, y: int, z: int) -> Any:
     """Returns the 27 bits of the free voxels around one."""
-    free = 0
+    free: Any = 0
     word, shift = z >> 5, z & 31
     for i in range(3):
         for j in range(3):
@@ -128,24 +129,27 @@ def _free_around(words: NDArray[np.uint32], x: int, y: int, z: int) -> int:
     return free
 
 
+class Nodes(NamedTuple):
+    """What a search knows of each node, the table of their voxels, and the heap of open ones."""
+
+    points: NDArray[np.float64]
+    costs: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    parents: NDArray[np.int32]
+    closed: NDArray[np.bool_]
+    table: NDArray[np.int32]
+    keys: NDArray[np.float64]
+    heap: NDArray[np.int32]
+
+
 @kernel
-def _settle(
-    words: NDArray[np.uint32],
-    node: int,
-    near: int,
-    points: NDArray[np.float64],
-    costs: NDArray[np.float64],
-    parents: NDArray[np.int32],
-    closed: NDArray[np.bool_],
-    table: NDArray[np.int32],
-    cells: NDArray[np.int64],
-    slopes: Slopes,
-) -> bool:
+def _settle(words: NDArray[np.uint32], nodes: Nodes, node: int, near: int, slopes: Slopes) -> bool:
     """Checks the way from a node's parent, takes that from the best neighbour if it is blocked.
 
     Returns whether there is a way; ``near`` are the 27 bits of free voxels around the node.
     """
-    if edge(words, points[parents[node]], points[node], slopes) >= 0:
+    points, costs = nodes.points, nodes.costs
+    if edge(words, points[nodes.parents[node]], points[node], slopes) >= 0:
         return True
     across_y, across_x = 32 * words.shape[2], 32 * words.shape[2] * words.shape[1]
     costs[node] = np.inf
@@ -153,13 +157,56 @@ def _settle(
         if step == _CENTER or near & _BOXES[step] != _BOXES[step]:
             continue
         shift = (step // 9 - 1) * across_x + (step // 3 % 3 - 1) * across_y + step % 3 - 1
-        other = table[_slot(table, cells, cells[node] + shift)]
-        if other < 0 or not closed[other]:
+        other = nodes.table[_slot(nodes.table, nodes.cells, nodes.cells[node] + shift)]
+        if other < 0 or not nodes.closed[other]:
             continue
         cost = costs[other] + edge_cost(points[other], points[node], slopes)
         if cost < costs[node] and edge(words, points[other], points[node], slopes) >= 0:
-            costs[node], parents[node] = cost, other
-    return costs[node] < np.inf
+            costs[node], nodes.parents[node] = cost, other
+    return bool(costs[node] < np.inf)
+
+
+@inlined_kernel
+def _relax(
+    nodes: Nodes,
+    node: int,
+    near: int,
+    place: tuple[int, int, int],
+    strides: tuple[int, int],
+    goal: NDArray[np.float64],
+    last: int,
+    slopes: Slopes,
+    counts: NDArray[np.int64],
+) -> None:
+    """Offers the free voxels around a node a way over its parent.
+
+    ``counts`` are the nodes known, and those in the heap.
+    """
+    points, costs, parent = nodes.points, nodes.costs, nodes.parents[node]
+    for step in range(27):
+        if step == _CENTER or near & _BOXES[step] != _BOXES[step]:
+            continue
+        sx, sy, sz = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1
+        cell = nodes.cells[node] + sx * strides[0] + sy * strides[1] + sz
+        slot = _slot(nodes.table, nodes.cells, cell)
+        other = np.int64(nodes.table[slot])
+        if other < 0:
+            other = counts[0]
+            counts[0] += 1
+            nodes.table[slot], nodes.cells[other], costs[other] = other, cell, np.inf
+            points[other, 0] = place[0] + sx + 0.5
+            points[other, 1] = place[1] + sy + 0.5
+            points[other, 2] = place[2] + sz + 0.5
+            if cell == last:
+                points[other] = goal
+        if nodes.closed[other]:
+            continue
+        cost = costs[parent] + edge_cost(points[parent], points[other], slopes)
+        if cost < costs[other]:
+            costs[other], nodes.parents[other] = cost, parent
+            remaining = GREED * edge_cost(points[other], goal, slopes)
+            _push(nodes.keys, nodes.heap, counts[1], cost + remaining, other)
+            counts[1] += 1
 
 
 @kernel
@@ -170,62 +217,40 @@ def _search(
     slopes: Slopes,
     capacity: int,
 ) -> tuple[int, NDArray[np.float64]]:
-    nz = 32 * words.shape[2]
-    across_y, across_x = nz, nz * words.shape[1]
-    points = np.empty((capacity, 3))
-    costs, cells = np.empty(capacity), np.empty(capacity, np.int64)
-    parents, closed = np.empty(capacity, np.int32), np.zeros(capacity, np.bool_)
-    table = np.full(2 * capacity, -1, np.int32)
-    keys, heap = np.empty(4 * capacity), np.empty(4 * capacity, np.int32)
-    first = math.floor(start[0]) * across_x + math.floor(start[1]) * across_y + math.floor(start[2])
-    last = math.floor(goal[0]) * across_x + math.floor(goal[1]) * across_y + math.floor(goal[2])
-    points[0], costs[0], cells[0], parents[0] = start, 0.0, first, 0
-    table[_slot(table, cells, first)] = 0
-    _push(keys, heap, 0, edge_cost(start, goal, slopes), 0)
-    waiting, count = 1, 1
-    while waiting > 0:
-        node = _pop(keys, heap, waiting)
-        waiting -= 1
-        if closed[node]:
+    ny, nz = words.shape[1], 32 * words.shape[2]
+    nodes = Nodes(
+        np.empty((capacity, 3)),
+        np.empty(capacity),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int32),
+        np.zeros(capacity, np.bool_),
+        np.full(2 * capacity, -1, np.int32),
+        np.empty(4 * capacity),
+        np.empty(4 * capacity, np.int32),
+    )
+    first = (math.floor(start[0]) * ny + math.floor(start[1])) * nz + math.floor(start[2])
+    last = (math.floor(goal[0]) * ny + math.floor(goal[1])) * nz + math.floor(goal[2])
+    nodes.points[0], nodes.costs[0], nodes.cells[0], nodes.parents[0] = start, 0.0, first, 0
+    nodes.table[_slot(nodes.table, nodes.cells, first)] = 0
+    _push(nodes.keys, nodes.heap, 0, 0.0, 0)
+    counts = np.ones(2, np.int64)
+    while counts[1] > 0:
+        node = _pop(nodes.keys, nodes.heap, counts[1])
+        counts[1] -= 1
+        if nodes.closed[node]:
             continue
-        cell = cells[node]
-        x, y, z = cell // across_x, cell // nz % words.shape[1], cell % nz
+        cell = nodes.cells[node]
+        x, y, z = cell // (ny * nz), cell // nz % ny, cell % nz
         near = _free_around(words, x, y, z)
-        if node > 0 and not _settle(
-            words, node, near, points, costs, parents, closed, table, cells, slopes
-        ):
+        if node > 0 and not _settle(words, nodes, node, near, slopes):
             continue
-        closed[node] = True
-        if cell == last or edge(words, points[node], goal, slopes) >= 0:
-            return FOUND, _traced(points, parents, node, goal)
-        if count + 27 > capacity or waiting + 27 > 4 * capacity:
-            return TOO_LARGE, points[:0]
-        parent = parents[node]
-        for step in range(27):
-            if near & _BOXES[step] != _BOXES[step] or step == _CENTER:
-                continue
-            sx, sy, sz = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1
-            slot = _slot(table, cells, cell + sx * across_x + sy * across_y + sz)
-            other = table[slot]
-            if other < 0:
-                other = count
-                count += 1
-                table[slot], cells[other] = other, cell + sx * across_x + sy * across_y + sz
-                points[other, 0], points[other, 1], points[other, 2] = (
-                    x + sx + 0.5, y + sy + 0.5, z + sz + 0.5,
-                )  # fmt: skip
-                if cells[other] == last:
-                    points[other] = goal
-                costs[other], parents[other] = np.inf, -1
-            if closed[other]:
-                continue
-            cost = costs[parent] + edge_cost(points[parent], points[other], slopes)
-            if cost < costs[other]:
-                costs[other], parents[other] = cost, parent
-                remaining = GREED * edge_cost(points[other], goal, slopes)
-                _push(keys, heap, waiting, cost + remaining, other)
-                waiting += 1
-    return UNREACHABLE, points[:0]
+        nodes.closed[node] = True
+        if cell == last or edge(words, nodes.points[node], goal, slopes) >= 0:
+            return FOUND, _traced(nodes.points, nodes.parents, node, goal)
+        if counts[0] + 27 > capacity or counts[1] + 27 > 4 * capacity:
+            return TOO_LARGE, nodes.points[:0]
+        _relax(nodes, node, near, (x, y, z), (ny * nz, nz), goal, last, slopes, counts)
+    return UNREACHABLE, nodes.points[:0]
 
 
 @kernel

@@ -9,6 +9,7 @@ search wants to use it (Dellin and Srinivasa 2016, lazy shortest paths).
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ def _best_of_blocks(corners: NDArray[np.float64], side: float) -> NDArray[np.flo
 
 
 @inlined_kernel
-def _edge_bits(words: NDArray[np.uint32], x: int, y: int, w: int) -> np.uint32:
+def _edge_bits(words: NDArray[np.uint32], x: int, y: int, w: int) -> Any:
     """Returns the free voxels of a word that lie at a convex edge of something blocked."""
     last = words.shape[2] - 1
     found = np.uint32(0)
@@ -137,28 +138,19 @@ def _search(
 ) -> NDArray[np.float64]:
     """Returns the shortest path from the first to the second point, over the others."""
     n = len(points)
-    costs, parents = np.full(n, np.inf), np.full(n, -1, np.int32)
+    costs, parents = np.full(n, np.inf), np.zeros(n, np.int32)
     remaining = np.empty(n)
     closed, refused = np.zeros(n, np.bool_), np.zeros((n, n), np.bool_)
     for k in range(n):
         remaining[k] = edge_cost(points[k], points[1], slopes)
-    costs[0], parents[0] = 0.0, 0
+    costs[0] = 0.0
     while True:
-        node, best = -1, np.inf
-        for k in range(n):
-            if not closed[k] and costs[k] + remaining[k] < best:
-                node, best = k, costs[k] + remaining[k]
+        node = _next(costs, remaining, closed)
         if node < 0:
             return points[:0]
-        parent = parents[node]
-        if node != 0 and edge(words, points[parent], points[node], slopes) < 0:
-            refused[node, parent] = True
-            costs[node] = np.inf
-            for k in range(n):
-                if closed[k] and not refused[node, k]:
-                    cost = costs[k] + edge_cost(points[k], points[node], slopes)
-                    if cost < costs[node]:
-                        costs[node], parents[node] = cost, k
+        if node != 0 and edge(words, points[parents[node]], points[node], slopes) < 0:
+            refused[node, parents[node]] = True
+            _find_parent(node, points, slopes, closed, refused, costs, parents)
             continue
         closed[node] = True
         if node == 1:
@@ -168,6 +160,37 @@ def _search(
                 cost = costs[node] + edge_cost(points[node], points[k], slopes)
                 if cost < costs[k]:
                     costs[k], parents[k] = cost, node
+
+
+@inlined_kernel
+def _next(
+    costs: NDArray[np.float64], remaining: NDArray[np.float64], closed: NDArray[np.bool_]
+) -> int:
+    """Returns the open node with the least way over it, -1 when there is none."""
+    node, best = -1, np.inf
+    for k in range(len(costs)):
+        if not closed[k] and costs[k] + remaining[k] < best:
+            node, best = k, costs[k] + remaining[k]
+    return node
+
+
+@inlined_kernel
+def _find_parent(
+    node: int,
+    points: NDArray[np.float64],
+    slopes: Slopes,
+    closed: NDArray[np.bool_],
+    refused: NDArray[np.bool_],
+    costs: NDArray[np.float64],
+    parents: NDArray[np.int32],
+) -> None:
+    """Gives a node the best closed parent that was not refused."""
+    costs[node] = np.inf
+    for k in range(len(points)):
+        if closed[k] and not refused[node, k]:
+            cost = costs[k] + edge_cost(points[k], points[node], slopes)
+            if cost < costs[node]:
+                costs[node], parents[node] = cost, k
 
 
 @kernel

@@ -43,14 +43,14 @@ def slopes_of(climb_angle: float, descend_angle: float) -> Slopes:
 @inlined_kernel
 def bit(words: NDArray[np.uint32], x: int, y: int, z: int) -> bool:
     """Returns whether a voxel of the window is blocked."""
-    return (np.int64(words[x, y, z >> 5]) >> (z & 31)) & 1 != 0
+    return bool((np.int64(words[x, y, z >> 5]) >> (z & 31)) & 1)
 
 
 @inlined_kernel
 def inside(words: NDArray[np.uint32], x: float, y: float, z: float) -> bool:
     """Returns whether a point lies in the window."""
     nx, ny, nz = words.shape[0], words.shape[1], 32 * words.shape[2]
-    return 0.0 <= x < nx and 0.0 <= y < ny and 0.0 <= z < nz
+    return bool(0.0 <= x < nx and 0.0 <= y < ny and 0.0 <= z < nz)
 
 
 @kernel
@@ -58,7 +58,7 @@ def edge_cost(a: NDArray[np.float64], b: NDArray[np.float64], slopes: Slopes) ->
     """Returns the length of the way from a to b, voxels; (3,) each."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     straight = math.sqrt(dx * dx + dy * dy + dz * dz)
-    return max(straight, dz * slopes[0] if dz > 0.0 else -dz * slopes[2])
+    return float(max(straight, dz * slopes[0] if dz > 0.0 else -dz * slopes[2]))
 
 
 @kernel

@@ -145,8 +145,9 @@ def update_space(space: FlightSpace, voxels: VoxelMap) -> FlightSpace:
 
 def _touched(key: Key, changes: Bits, reach: int) -> list[Key]:
     """Returns the tiles with voxels within ``reach`` of the changed ones."""
-    depth = np.bitwise_or.reduce(changes, axis=None)
-    sides = (changes.any(axis=1), changes.any(axis=0), (depth >> np.arange(TILE)) & 1 != 0)
+    depth = int(np.bitwise_or.reduce(changes, axis=None))
+    heights = np.array([depth >> z & 1 for z in range(TILE)], np.bool_)
+    sides: Any = (changes.any(axis=1), changes.any(axis=0), heights)
     steps = []
     for side in sides:
         first, last = int(np.argmax(side)), TILE - 1 - int(np.argmax(side[::-1]))
@@ -209,7 +210,7 @@ def _smeared(word: Any, reach: int, upward: bool) -> Any:
     while left > 0:
         step = np.uint64(min(width, left))
         word |= (word << step) if upward else (word >> step)
-        left -= np.int64(step)
+        left -= min(width, left)
         width *= 2
     return word
 

@@ -31,11 +31,13 @@ class FlightWindow(Message):
 
     def point(self, p_WP: tuple[float, float, float]) -> NDArray[np.float64]:
         """Returns a world point in voxels of the window, (3,) float64."""
-        return np.array(p_WP) / self.resolution - np.array(self.low)
+        point: NDArray[np.float64] = np.array(p_WP) / self.resolution - np.array(self.low)
+        return point
 
     def world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Returns points of the window, (..., 3), in the world, metres."""
-        return (points + np.array(self.low)) * self.resolution
+        p_WP: NDArray[np.float64] = (points + np.array(self.low)) * self.resolution
+        return p_WP
 
     def contains(self, point: NDArray[np.float64]) -> bool:
         """Returns whether a point lies within the window and off its blocked border."""

@@ -127,17 +127,16 @@ class Vision(Level):
         return dataclasses.replace(state, request=request)
 
     def _conclude(self, state: VisionState, reply: MllmReply) -> VisionState:
-        request = state.request
-        problem = reply.error
+        request, problem = state.request, reply.error
         if not problem:
             try:
                 action = parse_vision_reply(reply.text, request)
                 return dataclasses.replace(state, action=action)
             except ReplyFormatError as error:
                 problem = str(error)
-            if request.attempt < MAX_REASKS:
-                again = dataclasses.replace(request, attempt=request.attempt + 1, feedback=problem)
-                return dataclasses.replace(state, request=again)
+        if request.attempt < MAX_REASKS and (reply.unusable or not reply.error):
+            again = dataclasses.replace(request, attempt=request.attempt + 1, feedback=problem)
+            return dataclasses.replace(state, request=again)
         assert isinstance(request.variables, VisionVariables)
         nothing = VisionAction(
             n=request.n,

@@ -1,0 +1,60 @@
+"""The cassettes that come with the package: episodes that a multimodal model has decided."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from unilavira_drake.episode import run_episode
+from unilavira_drake.mllm.cassette_file import read_header, read_replies
+from unilavira_drake.recording.result import EpisodeResult
+from unilavira_drake.resources import cassettes_path
+from unilavira_drake.scenario_loading import load_scenario
+
+CASSETTES = sorted(path.stem for path in cassettes_path().glob("*.jsonl"))
+
+
+def replay(name: str, out: Path) -> EpisodeResult:
+    header = read_header(cassettes_path() / f"{name}.jsonl")
+    overlay = {
+        "language_model": f"cassette:{name}",
+        "vision_model": f"cassette:{name}",
+        "random_seed": header.seed,
+        "ablation": header.ablation,
+        "prompt_preset": header.preset,
+        "task": {"text": header.task},
+    }
+    # JSON is YAML.
+    return run_episode(load_scenario(header.scenario, json.dumps(overlay)), out=out)
+
+
+def test_there_is_one_of_each_home() -> None:
+    scenarios = {read_header(cassettes_path() / f"{name}.jsonl").scenario for name in CASSETTES}
+    assert {"apartment", "office"} <= scenarios
+
+
+@pytest.mark.parametrize("name", CASSETTES)
+def test_the_header_tells_who_answered_and_when(name: str) -> None:
+    header = read_header(cassettes_path() / f"{name}.jsonl")
+    assert header.answered_by
+    assert header.date
+    for model in (header.language, header.vision):
+        assert (model.perception, model.reasoning) == ("images", "model")
+
+
+@pytest.mark.parametrize("name", CASSETTES)
+def test_an_episode_is_replayed_to_its_end_byte_for_byte(name: str, tmp_path: Path) -> None:
+    results = [replay(name, tmp_path / run) for run in ("first", "second")]
+    assert results[0].success
+    assert results[0].cause == "stopped"
+    assert results[0].model.reasoning == "model"
+    assert results[0].model.perception == "images"
+    transcripts = [
+        (tmp_path / run / "transcript.jsonl").read_bytes() for run in ("first", "second")
+    ]
+    assert transcripts[0] == transcripts[1]
+    counts = results[0].counts
+    replies = read_replies(cassettes_path() / f"{name}.jsonl")
+    assert counts.language_calls + counts.vision_calls == len(replies)
