@@ -33,10 +33,13 @@ def print_summary(result: EpisodeResult, out: Path, console: Console) -> None:
 def next_commands(result: EpisodeResult, out: Path) -> tuple[str, str, str]:
     """Returns three commands that a person would try after this episode."""
     again = f"unilavira run --scenario {shlex.quote(str(out / 'scenario.yaml'))}"
-    other = "no_tdm" if result.ablation == "full" else "full"
+    other = f"--ablation {'no_tdm' if result.ablation == 'full' else 'full'}"
+    if result.model.reasoning != "rules":
+        # A cassette has no replies to other prompts, and a real model costs money.
+        other = "--model rules"
     return (
         f"unilavira report {shlex.quote(str(out))}",
-        f"{again} --ablation {other}",
+        f"{again} {other}",
         'unilavira run --start bedroom --task "Go to the kitchen and stop at the refrigerator."',
     )
 

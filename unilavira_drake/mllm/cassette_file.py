@@ -38,6 +38,9 @@ class Replies:
         self.place = place
         self._replies: dict[Key, RecordedReply] = {}
 
+    def __len__(self) -> int:
+        return len(self._replies)
+
     def add(self, reply: RecordedReply) -> None:
         """Adds a reply; it replaces an older one of its key."""
         self._replies[reply.key] = reply
@@ -53,7 +56,7 @@ class Replies:
         nearest = "; ".join(f"{named(key)} ({self._replies[key].call})" for key in near)
         return CassetteError(
             f"{self.place}: no reply to {named(asked)} ({request.call}); "
-            f"the nearest of its {len(self._replies)}: {nearest or 'none'}."
+            f"the nearest of its {len(self)}: {nearest or 'none'}."
         )
 
 

@@ -189,7 +189,7 @@ def _relax(
         sx, sy, sz = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1
         cell = nodes.cells[node] + sx * strides[0] + sy * strides[1] + sz
         slot = _slot(nodes.table, nodes.cells, cell)
-        other = np.int64(nodes.table[slot])
+        other: Any = nodes.table[slot]
         if other < 0:
             other = counts[0]
             counts[0] += 1
