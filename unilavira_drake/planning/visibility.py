@@ -37,7 +37,7 @@ Point = tuple[float, float, float]
 
 UNREACHABLE = "unreachable"
 NO_WAY_OUT = "no free space around the aircraft"
-TOO_STEEP = "no way within the limits of climb and descent"
+TOO_MANY = "too many voxels to search"
 
 NEAR = 80
 """To goals nearer than this the any-angle path is not compared with corners, voxels."""
@@ -126,7 +126,7 @@ def make_flight_plan(
     for margin in (max(24, int(0.4 * voxels)), max(200, int(1.5 * voxels))):
         window = _window(space, (position, target), margin, parameters)
         if window is None:
-            return FlightPlan(reason=reason or "too many voxels")
+            return FlightPlan(reason=reason or TOO_MANY)
         start = way_out(space, window, position, _escape(position, parameters))
         if start is None:
             return FlightPlan(reason=NO_WAY_OUT)
@@ -134,7 +134,7 @@ def make_flight_plan(
         if not plan.reason:
             return plan
         reason = plan.reason
-        if reason not in (UNREACHABLE, TOO_STEEP):
+        if reason != UNREACHABLE:
             break
     return FlightPlan(reason=reason)
 
@@ -169,13 +169,12 @@ def _plan_in(
     nodes = route(window, start, end, parameters.slopes)
     if not len(nodes):
         within_reach = reachable(window, start)
-        was_within_reach = not within_reach.is_blocked(end)
-        end = end_in(within_reach)
-        if end is None:
-            return FlightPlan(reason=UNREACHABLE)
-        nodes = route(window, start, end, parameters.slopes)
+        found = None if not within_reach.is_blocked(end) else end_in(within_reach)
+        if found is not None:
+            nodes = route(window, start, found, parameters.slopes)
         if not len(nodes):
-            return FlightPlan(reason=TOO_STEEP if was_within_reach else UNREACHABLE)
+            failed = not within_reach.is_blocked(end) or found is not None
+            return FlightPlan(reason=TOO_MANY if failed else UNREACHABLE)
     p_WP = window.world(unfold(window.words, nodes, parameters.slopes))
     if math.dist(p_WP[0], position) > 1e-9:
         p_WP = np.concatenate((np.array([position]), p_WP))

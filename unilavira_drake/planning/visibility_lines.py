@@ -6,7 +6,8 @@ always are.
 
 An aircraft that may climb at no more than some angle reaches a steep goal by switchbacks.  The
 length of such a way is ``max(|d|, |dz| / sin(angle))`` whatever its shape, which is a norm: all
-searches use it as the cost of an edge.
+searches use it as the cost of an edge.  Switchbacks may be so narrow that they fit wherever the
+straight rise does, so the limits of climb and descent never cut off a goal.
 """
 
 from __future__ import annotations

@@ -64,8 +64,8 @@ class VisibilityPlanner(Level):
     the aircraft moves, the way is planned anew when a new map blocks it, or when the map changed,
     the plan is ``replan_period`` old and the goal is not near.  ``path`` carries (k, 3) points.
     Reasons of failure: the goal's own, ``unreachable``, ``no free space within ... m``, ``no free
-    space around the aircraft``, ``no way within the limits of climb and descent``, ``farther than
-    ... m``, ``stuck``, ``travel budget``, and numbers that are none.
+    space around the aircraft``, ``too many voxels to search``, ``farther than ... m``, ``stuck``,
+    ``travel budget``, and numbers that are none.
 
     .. pydrake_system::
 
