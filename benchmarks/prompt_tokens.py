@@ -5,7 +5,8 @@
 ``rules`` chooses, so that there is a history; each prompt is counted as Gemini counts pictures
 (280, 560 or 1,120 tokens for low, medium or high) and texts at four characters a token.  Prints
 one JSON object a line; prompts with their split: ``rules`` (the part that never changes), ``text``
-(all other words), ``history`` (pictures of the past), ``views``.
+(all other words), ``history`` (pictures of the past), ``views``, ``schema`` (of the reply, which
+Gemini counts as input).
 
 * ``L2``: the ``decide`` call of the tenth decision.  Below it what it must show all the same: the
   least tokens of a view, pictures of the past, and TODO list and feedback in full (1: uncut).
@@ -18,6 +19,7 @@ one JSON object a line; prompts with their split: ``rules`` (the part that never
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable
 from unittest import mock
 
@@ -28,6 +30,7 @@ from unilavira_drake.mllm.profile import ImageTokens
 from unilavira_drake.mllm.profiles import load_profile
 from unilavira_drake.mllm.prompt import compose_prompt
 from unilavira_drake.mllm.reply import Completion
+from unilavira_drake.mllm.reply_schema import gemini_schema, request_schema
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 from unilavira_drake.mllm.rules.model import RulesModel
 from unilavira_drake.mllm.tokens import picture_tokens, text_tokens
@@ -57,7 +60,10 @@ def tokens(request: MllmRequest, rule: ImageTokens) -> dict[str, int]:
     prompt = compose_prompt(request)
     views = [image for image in prompt.images if image.label.startswith("view ")]
     past = [image for image in prompt.images if not image.label.startswith("view ")]
+    schema = request_schema(request)
+    written = "" if schema is None else json.dumps(gemini_schema(schema), separators=(",", ":"))
     return {
+        "schema": text_tokens(written),
         "rules": text_tokens(prompt.system),
         "text": text_tokens("".join(part for part in prompt.parts if isinstance(part, str))),
         "history": sum(picture_tokens(image, rule) for image in past),
@@ -69,7 +75,7 @@ def tokens(request: MllmRequest, rule: ImageTokens) -> dict[str, int]:
 
 def total(split: dict[str, int]) -> int:
     """Returns all tokens of a prompt."""
-    return split["rules"] + split["text"] + split["history"] + split["views"]
+    return sum(split[part] for part in ("schema", "rules", "text", "history", "views"))
 
 
 def in_full(request: MllmRequest) -> bool:

@@ -67,7 +67,7 @@ def test_a_picture_after_each_keyframe_travel() -> None:
     first, *others = way.state.pictures
     assert (first.label, first.n) == ("H1: front view at waypoint 1", 1)
     assert {p.label.partition(": ")[2] for p in others} == {
-        "on the way that left waypoint 1 by its left view"
+        "leaving waypoint 1 by its left view"
     }
 
 

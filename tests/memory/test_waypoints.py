@@ -117,10 +117,10 @@ def test_arrived_backtrack_names_the_failed_direction_and_its_pictures() -> None
     assert state.history.current == 2
     assert [p.label for p in state.history.keyframes] == [
         "H1: front view at waypoint 1",
-        "H2: on the way that left waypoint 1 by its front view",
+        "H2: leaving waypoint 1 by its front view",
         "H3: front view at waypoint 2",
-        "H4: on the way that left waypoint 2 by its left view",
-        "H5: on the way that left waypoint 2 by its left view",
+        "H4: leaving waypoint 2 by its left view",
+        "H5: leaving waypoint 2 by its left view",
         "H6: front view at waypoint 3",
     ]
 

@@ -98,7 +98,7 @@ def test_the_body_has_the_documented_form() -> None:
     assert value["systemInstruction"] == {"parts": [{"text": "The rules."}]}
     generation = value["generationConfig"]
     schema = generation.pop("responseJsonSchema")
-    assert schema["propertyOrdering"] == schema["required"]
+    assert schema["required"] == list(schema["properties"])
     assert generation == {
         "temperature": 1.0,
         "maxOutputTokens": 16384,

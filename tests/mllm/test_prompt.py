@@ -63,7 +63,7 @@ VARIABLES = LanguageVariables(
 )
 PAST = (
     ImagePart("H1: front view at waypoint 1", b"first", "low"),
-    ImagePart("H2: on the way that left waypoint 1 by its front view", b"second", "low"),
+    ImagePart("H2: leaving waypoint 1 by its front view", b"second", "low"),
 )
 IMAGES = tuple(ImagePart(f"view {d}", d.encode(), "medium") for d in DIRECTIONS)
 DECIDE = MllmRequest(n=4, call="decide", variables=VARIABLES, images=PAST + IMAGES)
@@ -269,7 +269,7 @@ def test_hostile_text_stays_inside_its_quotes() -> None:
         todo=(TodoItem(HOSTILE, "completed", HOSTILE),),
         todo_feedback=(HOSTILE,),
         waypoints=(WaypointNote(1, target=HOSTILE, scene=HOSTILE, tried=(HOSTILE,)),),
-        decisions=(DecisionNote(1, HOSTILE),),
+        decisions=(DecisionNote(1, HOSTILE + "x"),),
         outcome="failed: " + HOSTILE,
     )
     composed = compose_prompt(dataclasses.replace(hostile, feedback=HOSTILE))
@@ -310,7 +310,7 @@ def test_what_a_model_wrote_is_cut_to_its_length() -> None:
             todo=(TodoItem(flood, "completed", flood),),
             todo_feedback=(flood,),
             waypoints=(WaypointNote(1, target=flood, scene=flood, tried=(flood,)),),
-            decisions=(DecisionNote(1, flood),),
+            decisions=(DecisionNote(1, "a " + flood),),
         )
     )
     assert len(text) < len(_text(DECIDE)) + 4000

@@ -43,7 +43,7 @@ KEYWORDS = {
     "gemini": {
         "$id", "$defs", "$ref", "$anchor", "type", "format", "title", "description", "enum",
         "items", "prefixItems", "minItems", "maxItems", "minimum", "maximum", "anyOf", "oneOf",
-        "properties", "additionalProperties", "required", "propertyOrdering",
+        "properties", "additionalProperties", "required",
     },
     "openai": {
         "type", "description", "enum", "const", "items", "minItems", "maxItems", "minimum",
@@ -140,7 +140,7 @@ def test_both_dialects_keep_to_their_subset(name: str) -> None:
 def test_reasoning_comes_before_what_it_decides() -> None:
     schema = request_schema(DECIDE)
     assert schema is not None
-    assert gemini_schema(schema)["propertyOrdering"] == [
+    assert gemini_schema(schema)["required"] == [
         "progress_analysis",
         "reasoning_todo",
         "todo_updates",

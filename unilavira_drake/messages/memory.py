@@ -77,7 +77,7 @@ class KeyPicture(Message):
     def label(self) -> str:
         """Name and what it is, e.g. ``H1: front view at waypoint 1``."""
         if self.direction:
-            way = f"on the way that left waypoint {self.waypoint} by its {self.direction} view"
+            way = f"leaving waypoint {self.waypoint} by its {self.direction} view"
             return f"{self.name}: {way}"
         return f"{self.name}: front view at waypoint {self.waypoint}"
 

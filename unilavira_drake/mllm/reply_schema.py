@@ -197,8 +197,6 @@ def _for_gemini(schema: Schema) -> Schema:
     plain.pop("additionalProperties", None)
     if "const" in plain:
         plain["enum"] = [plain.pop("const")]
-    if "properties" in plain:
-        plain["propertyOrdering"] = list(plain["properties"])
     forms = plain.get("anyOf", [])
     if len(forms) == 2 and {"type": "null"} in forms:
         other = next(form for form in forms if form != {"type": "null"})
