@@ -171,6 +171,21 @@ def test_any_progress_puts_off_the_stall(news):
     assert bench.metrics.cause == "stalled"
 
 
+def test_a_model_may_think_longer_than_the_stall():
+    bench = Bench(stall=1.0)
+    bench.fix("language_usage", ModelUsage(asked=1))
+    for _ in range(30):
+        bench.tick()
+    assert not bench.metrics.ended
+    bench.fix("language_usage", ModelUsage(asked=1, calls=1))
+    for _ in range(5):
+        bench.tick()
+    assert not bench.metrics.ended
+    for _ in range(12):
+        bench.tick()
+    assert bench.metrics.cause == "stalled"
+
+
 MODEL_BUDGETS = {
     "call_budget": {"model_calls": 5},
     "token_budget": {"model_tokens": 2200},

@@ -105,7 +105,7 @@ def test_no_latency_means_the_next_tick_and_a_reask_is_a_new_request() -> None:
         assert bench.reply(simulator).text == f"1.{attempt}"
     simulator.AdvanceTo(3.0)
     assert bench.broker.calls == 2
-    assert bench.usage(simulator) == ModelUsage(2, 0, 2, Usage(200, 40, 8, 1.0), 1.0, 2.5)
+    assert bench.usage(simulator) == ModelUsage(2, 0, 2, Usage(200, 40, 8, 1.0), 1.0, 2.5, asked=2)
 
 
 def test_clones_share_one_call_and_one_future() -> None:
@@ -145,13 +145,14 @@ def test_an_error_is_a_value() -> None:
     reply = bench.reply(bench.simulator)
     assert (reply.n, reply.text, reply.usage) == (1, "", Usage(cost_usd=0.0))
     assert reply.infrastructure
-    assert reply.error == "MllmError: the service answered 503"
+    # Its words may hold an address or a time of the day, and replies stand in transcripts.
+    assert reply.error == "MllmError"
     bench.ask(bench.simulator, MllmRequest(n=2))
     bench.simulator.AdvanceTo(2.0)
     assert (bench.reply(bench.simulator).text, bench.reply(bench.simulator).error) == ("fine", "")
     usage = bench.usage(bench.simulator)
     assert (usage.calls, usage.errors, usage.attempts, usage.total) == (2, 1, 2, COST)
-    assert usage.failure == reply.error
+    assert usage.failure == "MllmError: the service answered 503"
 
 
 def test_a_refusal_is_the_model_s_own_and_is_paid_for() -> None:
@@ -167,7 +168,7 @@ def test_a_refusal_is_the_model_s_own_and_is_paid_for() -> None:
     assert reply.error == "ReplyRefused: blocked by a filter"
     assert not reply.infrastructure
     assert reply.usage == COST + COST
-    assert bench.usage(bench.simulator) == ModelUsage(1, 1, 2, COST + COST, 1.0, 3.0)
+    assert bench.usage(bench.simulator) == ModelUsage(1, 1, 2, COST + COST, 1.0, 3.0, asked=1)
 
 
 def test_a_measured_latency_is_what_the_model_says_it_took() -> None:
@@ -178,6 +179,19 @@ def test_a_measured_latency_is_what_the_model_says_it_took() -> None:
     assert bench.reply(simulator) == MllmReply()
     simulator.AdvanceTo(1.4)
     assert bench.reply(simulator).latency == 1.25
+
+
+def test_an_outage_takes_no_simulated_time() -> None:
+    def lose(request: MllmRequest) -> str:
+        error = MllmError("no connection")
+        error.latency = 720.0
+        raise error
+
+    bench = Bench(lose, latency=MeasuredLatency())
+    bench.ask(bench.simulator, MllmRequest(n=1))
+    bench.simulator.AdvanceTo(1.0)
+    assert bench.reply(bench.simulator).infrastructure
+    assert bench.usage(bench.simulator).seconds == 720.0
 
 
 def test_in_real_time_the_reply_is_visible_when_it_has_come() -> None:
@@ -201,7 +215,8 @@ def test_silence_is_the_named_timeout() -> None:
     bench.ask(bench.simulator, MllmRequest(n=1))
     bench.simulator.AdvanceTo(1.0)
     gate.set()
-    assert bench.reply(bench.simulator).error == "MllmTimeout: no reply within 0.05 s."
+    assert bench.reply(bench.simulator).error == "MllmTimeout"
+    assert bench.usage(bench.simulator).failure == "MllmTimeout: no reply within 0.05 s."
 
 
 def test_a_bug_of_the_backend_is_raised() -> None:

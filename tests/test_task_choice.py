@@ -28,3 +28,18 @@ def test_a_named_question_brings_its_answers() -> None:
     scenario.task.text = "@sofa_color"
     task = choose_task(scenario)
     assert (task.spec.family, task.answers) == ("eqa", ("orange",))
+
+
+def test_a_closed_question_brings_its_choices_and_its_rule() -> None:
+    scenario = load_scenario("apartment_eqa")
+    scenario.task.text = "in which room is the PIANO?"
+    task = choose_task(scenario)
+    assert (task.name, task.answers[0]) == ("piano_room", "dining room")
+    assert "dining room" in task.spec.choices
+    assert (task.rule.by_answer, task.rule.protocol) == (True, "home")
+
+
+def test_a_protocol_of_the_task_is_its_rule() -> None:
+    scenario = load_scenario("flat", "tasks: {fridge: {protocol: habitat}}")
+    scenario.task.text = "@fridge"
+    assert (choose_task(scenario).rule.radius, choose_task(scenario).rule.strict) == (3.0, True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass
 
 from pydrake.systems.framework import Diagram, System
@@ -18,6 +18,10 @@ from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
 from unilavira_drake.mllm.reply import Mllm
 from unilavira_drake.model_link import Latency, ModelLink
+from unilavira_drake.sensors.grounder_colors import color_candidates
+from unilavira_drake.sensors.grounder_labels import LabelGrounder
+from unilavira_drake.vision.grounder import Grounder
+from unilavira_drake.vision.grounding import Propose, from_pictures
 from unilavira_drake.vision.system import Vision
 from unilavira_drake.wiring import Wiring
 
@@ -48,6 +52,7 @@ def make_agent(
     free_distance: Callable[[Frame], float],
     detector: Callable[[Frame], ViewEvidence],
     prompt_preset: str = "compact",
+    grounder: str = "none",
     replace: MutableMapping[str, System] | None = None,
 ) -> Diagram:
     """Returns the agent; it is the same for every robot.
@@ -55,7 +60,8 @@ def make_agent(
     An ablation is wiring: without TDM ``todo_list`` stays unconnected, without SCB
     ``second_chance`` does.  The detector reaches a level only when its model declares
     ``perception: ground_truth``.  Targets beyond ``max_range`` (metres) are refused.
-    ``prompt_preset`` is a key of ``PROMPT_PRESETS``.
+    ``prompt_preset`` is a key of ``PROMPT_PRESETS``.  ``grounder`` is ``none``, ``color`` or
+    ``label`` (which reads the detector); a ``grounder`` in ``replace`` is wired in any case.
     """
     wiring = Wiring(replace)
     preset = PROMPT_PRESETS[prompt_preset]
@@ -117,11 +123,33 @@ def make_agent(
         wiring.give_output("todo_memory", "todo_list")
     for level in ("vision", "waypoint_memory", "goal_selector"):
         wiring.connect("language", "language_action", level)
-    wiring.connect("vision", "vision_action", "waypoint_memory")
-    wiring.connect("vision", "vision_action", "goal_selector")
+    marker = "vision"
+    if has_grounder(grounder, replace):
+        marker = "grounder"
+        wiring.add(
+            marker,
+            lambda: Grounder(
+                propose=_grounder(grounder, detector), period=tick, max_range=max_range
+            ),
+        )
+        wiring.connect("vision", "vision_action", marker)
+        wiring.give_output(marker, "grounding")
+    wiring.connect(marker, "vision_action", "waypoint_memory")
+    wiring.connect(marker, "vision_action", "goal_selector")
     wiring.connect("waypoint_memory", "history", "goal_selector")
     _border(wiring)
+    if marker != "vision":
+        wiring.take_input("panorama", marker)
     return wiring.build("agent")
+
+
+def has_grounder(grounder: str, replace: Mapping[str, System] | None) -> bool:
+    """Whether an agent has an auxiliary grounder: one of ours, or a user's own."""
+    return grounder != "none" or "grounder" in (replace or {})
+
+
+def _grounder(name: str, detector: Callable[[Frame], ViewEvidence]) -> Propose:
+    return LabelGrounder(detector) if name == "label" else from_pictures(color_candidates)
 
 
 def _border(wiring: Wiring) -> None:

@@ -9,7 +9,7 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Diagram, System
 from pydrake.systems.primitives import ConstantValueSource
 
-from unilavira_drake.agent import ModelChoice, make_agent
+from unilavira_drake.agent import ModelChoice, has_grounder, make_agent
 from unilavira_drake.episode_monitor import EpisodeMonitor
 from unilavira_drake.errors import ScenarioError, unknown_name
 from unilavira_drake.messages import Frame
@@ -60,6 +60,7 @@ def make_navigation_diagram(
         PortTypeError: if a replaced level lacks a port.
     """
     own = dict(replace or {})
+    grounder = has_grounder(scenario.grounder, own)
     models = models or make_models(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
     task = choose_task(scenario)
@@ -97,6 +98,7 @@ def make_navigation_diagram(
                 detector or GroundTruthDetector(world.labels, max_range=scenario.robot.max_depth)
             ),
             prompt_preset=scenario.prompt_preset,
+            grounder=scenario.grounder,
             replace=own,
         ),
     )
@@ -115,13 +117,15 @@ def make_navigation_diagram(
     wiring.add(
         "episode_monitor",
         lambda: EpisodeMonitor(
-            period=scenario.tick, budgets=scenario.budgets, goal_distance=goal_distance
+            period=scenario.tick, budgets=task.budgets, goal_distance=goal_distance
         ),
     )
     _close_the_ring(wiring)
     if on_message is not None:
-        wiring.add("recorder", lambda: Recorder(on_message, period=scenario.tick))
-        _listen(wiring, todo=scenario.ablation in ("full", "no_scb"))
+        wiring.add(
+            "recorder", lambda: Recorder(on_message, period=scenario.tick, grounder=grounder)
+        )
+        _listen(wiring, todo=scenario.ablation in ("full", "no_scb"), grounder=grounder)
     if own:
         levels = (*_TOP_LEVELS, *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
         raise ScenarioError(unknown_name("level", next(iter(own)), levels, "replace"))
@@ -134,6 +138,7 @@ _AGENT_LEVELS = (
     "language_link",
     "vision",
     "vision_link",
+    "grounder",
     "todo_memory",
     "waypoint_memory",
     "goal_selector",
@@ -166,7 +171,7 @@ def _close_the_ring(wiring: Wiring) -> None:
         wiring.connect("agent", f"{role}_usage", "episode_monitor")
 
 
-def _listen(wiring: Wiring, *, todo: bool) -> None:
+def _listen(wiring: Wiring, *, todo: bool, grounder: bool) -> None:
     wiring.connect("observer", "panorama", "recorder")
     wiring.connect("navigation", "navigation_status", "recorder")
     wiring.connect("navigation", "map", "recorder")
@@ -178,3 +183,5 @@ def _listen(wiring: Wiring, *, todo: bool) -> None:
         wiring.connect("agent", f"{role}_reply", "recorder")
     if todo:
         wiring.connect("agent", "todo_list", "recorder")
+    if grounder:
+        wiring.connect("agent", "grounding", "recorder")

@@ -16,8 +16,9 @@ from pydrake.systems.framework import Context, Diagram, System
 
 from unilavira_drake.diagram import make_navigation_diagram
 from unilavira_drake.episode_result import episode_result
-from unilavira_drake.evaluation.answers import judge_answer
+from unilavira_drake.evaluation.answers import score_answer
 from unilavira_drake.evaluation.goal_area import success_area
+from unilavira_drake.evaluation.judge import judge_episode
 from unilavira_drake.evaluation.scoring import (
     GoalField,
     Score,
@@ -100,13 +101,21 @@ def run_episode(
             ledgers.append(folder.record_attempt)
         episode.simulate()
         verdict = _verdict(task, episode, goal, start, tally)
+        verdict, error = judge_episode(
+            scenario.judge_model,
+            verdict,
+            task,
+            tally.answer,
+            seed=scenario.random_seed,
+            on_attempt=_to_each(ledgers),
+        )
         result = episode_result(
-            scenario, task, episode.metrics, verdict, tally, models, episode.usage
+            scenario, task, episode.metrics, verdict, tally, models, episode.usage, error
         )
         if folder is not None:
             folder.write("result.json", result.to_json())
             folder.write("timings.json", json.dumps(episode.timings, indent=2) + "\n")
-            folder.write("map.png", _map(world, trace, episode, goal, task.spec.text))
+            folder.write("map.png", _map(world, trace, episode, goal, task))
     return result
 
 
@@ -129,23 +138,28 @@ def _verdict(
     metrics = episode.metrics
     if metrics.cause == UNREACHABLE:
         return Score(path_length_m=metrics.path_length)
-    verdict = score(goal, metrics, start[:2], episode.output("observer", "panorama"))
-    if task.answers:
-        stopped = metrics.cause == "stopped"
-        return judge_answer(verdict, tally.answer, task.answers, stopped=stopped)
-    return verdict
+    verdict = score(goal, metrics, start[:2], episode.output("observer", "panorama"), task.rule)
+    if not (task.rule.by_answer and task.answers):
+        return verdict
+    return score_answer(
+        verdict,
+        tally.answer,
+        task.answers,
+        stopped=metrics.cause == "stopped",
+        choices=task.spec.choices,
+    )
 
 
 def _map(
-    world: World, trace: EpisodeTrace, episode: _Run, goal: GoalField | None, title: str
+    world: World, trace: EpisodeTrace, episode: _Run, goal: GoalField | None, task: EpisodeTask
 ) -> bytes:
     return map_picture(
         world,
         trace,
         episode.output("navigation", "map"),
         goals=() if goal is None else goal.places,
-        goal_area=() if goal is None else success_area(goal),
-        title=title,
+        goal_area=() if goal is None else success_area(goal, task.rule),
+        title=task.spec.text,
     )
 
 

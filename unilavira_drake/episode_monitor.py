@@ -118,7 +118,7 @@ class EpisodeMonitor(Level):
         time = context.get_time()
         action = self._action(context)
         new = self._follow_ring(context, self._follow_motion(context, state, time), action, time)
-        new = self._follow_models(context, self._follow_contacts(context, new))
+        new = self._follow_models(context, self._follow_contacts(context, new), time)
         cause = _cause(new, action, self._budgets, time, spent=state.spent)
         if new is state and not cause:
             return state
@@ -186,13 +186,14 @@ class EpisodeMonitor(Level):
         )
         return dataclasses.replace(state, metrics=metrics, in_contact=touching)
 
-    def _follow_models(self, context: Context, state: MonitorState) -> MonitorState:
+    def _follow_models(self, context: Context, state: MonitorState, time: float) -> MonitorState:
         seen = tuple(reader.optional(context) for reader in self._usages)
         usage = tuple(one for one in seen if one is not None)
         if usage == state.usage:
             return state
         spent = _spent(sum(usage, ModelUsage()), self._budgets)
-        return dataclasses.replace(state, usage=usage, spent=spent)
+        metrics = dataclasses.replace(state.metrics, progress_time=time)
+        return dataclasses.replace(state, metrics=metrics, usage=usage, spent=spent)
 
 
 def _spent(usage: ModelUsage, budgets: Budgets) -> str:
@@ -216,11 +217,14 @@ def _cause(
         return "stopped"
     if spent:
         return spent
-    if state.metrics.decisions >= budgets.decisions and _asks_again(state, action):
+    decisions = math.inf if budgets.decisions is None else budgets.decisions
+    if state.metrics.decisions >= decisions and _asks_again(state, action):
         return "decision_budget"
-    if time >= budgets.simulated_time:
+    if budgets.simulated_time is not None and time >= budgets.simulated_time:
         return "time_budget"
-    if time - state.metrics.progress_time >= budgets.stall:
+    # However long a model thinks: its own deadline ends that.
+    thinking = any(usage.thinking for usage in state.usage)
+    if not thinking and time - state.metrics.progress_time >= budgets.stall:
         return "stalled"
     return ""
 

@@ -28,19 +28,23 @@ def episode_result(
     tally: Tally,
     models: ModelPair,
     usage: ModelUsage,
+    judge_error: str = "",
 ) -> EpisodeResult:
-    """Returns what ``result.json`` holds; ``usage`` is that of both models together."""
+    """Returns what ``result.json`` holds.
+
+    ``usage`` is that of both models together, ``judge_error`` why a judge gave no mark.
+    """
     return EpisodeResult(
         scored=verdict.success is not None,
         success=verdict.success,
         cause=metrics.cause,
-        error=usage.failure,
-        task=TaskResult(task.spec.family, task.spec.text, task.name, task.goal),
+        error=usage.failure or judge_error,
+        task=TaskResult(task.spec.family, task.spec.text, task.name, task.goal, task.rule.protocol),
         scenario=scenario.name,
         robot=scenario.robot.name,
         ablation=scenario.ablation,
         seed=scenario.random_seed,
-        model=_model(models),
+        model=_model(models, scenario.grounder),
         metrics=MetricsResult(
             navigation_error_m=verdict.navigation_error_m,
             path_length_m=round(verdict.path_length_m, 4),
@@ -54,6 +58,7 @@ def episode_result(
             max_contact_force_n=round(metrics.max_contact_force, 3),
             answer=tally.answer or None,
             answer_correct=verdict.answer_correct,
+            answer_score=verdict.answer_score,
         ),
         counts=tally.counts(metrics.decisions),
         usage=UsageResult.of(usage),
@@ -62,10 +67,12 @@ def episode_result(
     )
 
 
-def _model(models: ModelPair) -> ModelResult:
+def _model(models: ModelPair, grounder: str) -> ModelResult:
     language, vision = models.language.backend, models.vision.backend
     # The weaker claim stands for the pair: one level on ground truth taints the whole result.
     perceptions = {language.perception, vision.perception}
+    if grounder == "label":
+        perceptions.add("ground_truth")
     return ModelResult(
         language=language.name,
         vision=vision.name,

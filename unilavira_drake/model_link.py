@@ -87,7 +87,13 @@ class ModelLink(Level):
         if request.n > 0 and (request.n, request.attempt) != known:
             self._broker.submit(request)
             delay = self._delay(request)
-            return dataclasses.replace(state, request=request, t_issue=now, t_visible=now + delay)
+            return dataclasses.replace(
+                state,
+                request=request,
+                t_issue=now,
+                t_visible=now + delay,
+                usage=state.usage + ModelUsage(asked=1),
+            )
         if not state.pending:
             return state
         if math.isinf(state.t_visible):
@@ -101,8 +107,9 @@ class ModelLink(Level):
         if isinstance(self._latency, RealTimeLatency):
             return math.inf
         if isinstance(self._latency, MeasuredLatency):
-            self._outcome(request)
-            return self._broker.latency(request)
+            # Nothing is waited for in vain: an outage must not use up the agent's simulated time.
+            lost = isinstance(self._outcome(request), MllmError)
+            return 0.0 if lost else self._broker.latency(request)
         return self._latency.sample(request)
 
     def _outcome(self, request: MllmRequest) -> Completion | MllmError | ReplyFormatError:
@@ -113,23 +120,37 @@ class ModelLink(Level):
 
     def _joined(self, state: LinkState) -> LinkState:
         outcome = self._outcome(state.request)
+        lost = isinstance(outcome, MllmError)
         reply = MllmReply(
             n=state.request.n,
             attempt=state.request.attempt,
             text=outcome.text if isinstance(outcome, Completion) else "",
-            error="" if isinstance(outcome, Completion) else _told(outcome),
+            error=_error(outcome),
             usage=outcome.usage if isinstance(outcome, Completion) else paid(outcome.attempts),
             latency=round(state.t_visible - state.t_issue, 9),
-            infrastructure=isinstance(outcome, MllmError),
+            infrastructure=lost,
             unusable=isinstance(outcome, ReplyFormatError) and outcome.worth_a_reask,
         )
         usage = state.usage.after(
             reply,
             attempts=len(outcome.attempts) or 1,
-            seconds=self._broker.latency(state.request),
+            # A model in this process has no latency of its own; how fast this machine is must not
+            # reach the Context.
+            seconds=outcome.latency or 0.0,
+            failure=f"{type(outcome).__name__}: {outcome}" if lost else "",
         )
         return dataclasses.replace(state, reply=reply, usage=usage)
 
 
-def _told(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+def _error(outcome: Completion | MllmError | ReplyFormatError) -> str:
+    """Returns what a port tells of an error: words of the model's own, else the name alone.
+
+    Words about a machine or a service may hold addresses and times, which belong in no Context.
+    """
+    if isinstance(outcome, Completion):
+        return ""
+    name = type(outcome).__name__
+    if isinstance(outcome, MllmError):
+        return name
+    # What a re-ask quotes is for the model, which knows none of our names.
+    return str(outcome) if outcome.worth_a_reask else f"{name}: {outcome}"

@@ -25,6 +25,7 @@ from unilavira_drake.robots.cobot_magic import CobotMagic
 # What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both.
 ABLATIONS = ("full", "no_tdm", "no_scb", "no_both")
 RENDERERS = ("vtk", "raster")
+GROUNDERS = ("none", "color", "label")
 
 
 # The first one is meant where a file writes no tag.
@@ -61,6 +62,12 @@ class NamedTask:
     # EQA: the expected answer and other accepted ones.
     answer: str = ""
     accept: list[str] = dc.field(default_factory=list)
+    # EQA: the closed vocabulary of the answer; empty: any words.
+    choices: list[str] = dc.field(default_factory=list)
+    # EQA: what kind of question it is, e.g. color, location, count; only for statistics.
+    question_type: str = ""
+    # How a stop is judged: home | habitat | ovon | uni_lavira.
+    protocol: str = "home"
 
 
 @dc.dataclass
@@ -79,9 +86,10 @@ class TaskChoice:
 class Budgets:
     """What ends an episode with a named cause."""
 
-    decisions: int = 40
-    # Simulated seconds.
-    simulated_time: float = 1800.0
+    # null: as many as the task's family has, 40 on the ground.
+    decisions: int | None = None
+    # Simulated seconds; null: those of the task's family, 1800 on the ground.
+    simulated_time: float | None = None
     # Simulated seconds without any progress of the ring.
     stall: float = 600.0
     # Of both models together, null: no limit. Calls, tokens in and out, seconds that the models
@@ -111,6 +119,8 @@ class Scenario:
     # PROFILE | PROFILE.yaml | openai:MODEL@BASE_URL.
     language_model: str = "rules"
     vision_model: str = "rules"
+    # SPEC of the model that gives an answer to a question a mark of 1 to 5; empty: none does.
+    judge_model: str = ""
     # A cassette that keeps every reply of this episode; empty: none.
     record: str = ""
     # record: a new file. record_new: replies that the file holds are replayed, others are asked
@@ -123,6 +133,9 @@ class Scenario:
     vision_latency: LatencyChoice = dc.field(default_factory=NoLatency)
     # full | no_tdm | no_scb | no_both.
     ablation: str = "full"
+    # What mends a mark of the vision model that is doubted. none | color (pixels) | label (the
+    # simulator's labels: the result then says perception ground_truth).
+    grounder: str = "none"
     # vtk | raster.
     renderer: str = "raster"
     meshcat: bool = False

@@ -15,6 +15,7 @@ from unilavira_drake.errors import InputError, ScenarioError, TaskError, unknown
 from unilavira_drake.messages import SWEEP_ORDERS
 from unilavira_drake.mllm.backends import make_backend, profile_of
 from unilavira_drake.mllm.cassette_file import RECORD_MODES
+from unilavira_drake.mllm.judges import make_judge
 from unilavira_drake.mllm.latency import (
     CONDITIONS,
     PaperLatency,
@@ -22,9 +23,9 @@ from unilavira_drake.mllm.latency import (
     recorded_latencies,
 )
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
-from unilavira_drake.scenario import ABLATIONS, RENDERERS, Scenario
+from unilavira_drake.scenario import ABLATIONS, GROUNDERS, RENDERERS, Scenario
 from unilavira_drake.task_choice import choose_task
-from unilavira_drake.tasks import FAMILIES, checked_task
+from unilavira_drake.tasks import FAMILIES, checked_task, success_rule
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.start import parse_start
 
@@ -77,6 +78,7 @@ def validate(scenario: Scenario) -> None:
         _check_number(place, value)
     _check_name("ablation", "ablation", scenario.ablation, ABLATIONS)
     _check_name("renderer", "renderer", scenario.renderer, RENDERERS)
+    _check_name("grounder", "grounder", scenario.grounder, GROUNDERS)
     _check_name("preset", "prompt_preset", scenario.prompt_preset, sorted(PROMPT_PRESETS))
     _check_name("robot", "robot.name", scenario.robot.name, robot_names())
     _check_name(
@@ -85,6 +87,8 @@ def validate(scenario: Scenario) -> None:
     _check_name("mode", "record_mode", scenario.record_mode, RECORD_MODES)
     for role in ("language", "vision"):
         _check_model(scenario, role)
+    if scenario.judge_model:
+        make_judge(scenario.judge_model)
     _check_order(scenario)
     _check_plant(scenario)
     _check_periods(scenario)
@@ -190,5 +194,10 @@ def _check_tasks(scenario: Scenario) -> None:
             checked_task(task.text, task.family)
         except TaskError as error:
             raise ScenarioError(f"{place}.text: {error}") from None
+        try:
+            checked_task(task.text, task.family, task.choices)
+            success_rule(task.family, task.protocol)
+        except TaskError as error:
+            raise ScenarioError(f"{place}: {error}") from None
     if scenario.default_task:
         _check_name("task", "default_task", scenario.default_task, sorted(scenario.tasks))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 from unilavira_drake.errors import ScenarioError, TaskError, unknown_name
-from unilavira_drake.scenario import NamedTask, Scenario
-from unilavira_drake.tasks import TaskSpec, checked_task
+from unilavira_drake.scenario import Budgets, NamedTask, Scenario
+from unilavira_drake.tasks import SuccessRule, TaskSpec, checked_task, success_rule
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,10 @@ class EpisodeTask:
     """Empty when the place is not scored."""
     answers: tuple[str, ...] = ()
     """Answers that count, of a question; empty when none is scored."""
+    rule: SuccessRule = SuccessRule()
+    """How its stop is judged."""
+    budgets: Budgets = dataclasses.field(default_factory=Budgets)
+    """The scenario's, with those of the family where it names none."""
 
 
 def choose_task(scenario: Scenario) -> EpisodeTask:
@@ -30,7 +35,7 @@ def choose_task(scenario: Scenario) -> EpisodeTask:
     text is scored only against an explicit goal.
 
     Raises:
-        TaskError: for an unknown name, or an empty or too long text.
+        TaskError: for an unknown name or protocol, an empty or too long text, or wrong choices.
         ScenarioError: if nothing is chosen and the scenario has no default task.
     """
     choice = scenario.task
@@ -46,13 +51,22 @@ def choose_task(scenario: Scenario) -> EpisodeTask:
     # Words of one's own that end in a question mark ask for an answer.
     family = "eqa" if text.rstrip().endswith("?") else "vln"
     task = scenario.tasks[name] if name else NamedTask(family=family, text=text)
+    spec = checked_task(task.text, task.family, task.choices)
     return EpisodeTask(
-        spec=checked_task(task.text, task.family),
+        spec=spec,
         name=name,
         start=choice.start or task.start or scenario.start,
         goal=choice.goal or task.goal,
         answers=(task.answer, *task.accept) if task.answer else (),
+        rule=success_rule(spec.family, task.protocol),
+        budgets=_budgets(scenario.budgets, spec),
     )
+
+
+def _budgets(asked: Budgets, spec: TaskSpec) -> Budgets:
+    usual = dataclasses.asdict(spec.budgets)
+    missing = {name: value for name, value in usual.items() if getattr(asked, name) is None}
+    return dataclasses.replace(asked, **missing)
 
 
 def _named(scenario: Scenario, text: str) -> str:

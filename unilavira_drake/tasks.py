@@ -1,16 +1,120 @@
-"""What the agent is asked: the task families and the task itself, without its goal."""
+"""What the agent is asked: the task itself, without its goal, and what its family says of it.
+
+Families are data: whatever differs between them stands in ``FAMILY_TABLE`` and in the words of
+``prompts/tasks/``.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from unilavira_drake.errors import TaskError
+from unilavira_drake.errors import TaskError, unknown_name
 from unilavira_drake.messages import Message
 
-FAMILIES = ("vln", "objectnav", "eqa", "aerial_vln")
-"""Route instruction, object goal, embodied question, flight directive (paper III-A)."""
-
 MAX_TASK_WORDS = 2000
+HOME = "home"
+"""The protocol of the worlds that come with the package."""
+
+
+@dataclass(frozen=True)
+class SuccessRule(Message):
+    """What makes a stop a success; a stop that the agent has not verified never is one."""
+
+    protocol: str = HOME
+    """``home``: ours.  ``habitat``: R2R and RxR, HM3D ObjectNav.  ``ovon``: HM3D-OVON.
+    ``uni_lavira``: the released code of the paper.  Where these measure to view points, the goal
+    gives them as ``X,Y|X,Y|...``; of a thing without any it is the free floor beside it."""
+    radius: float = 1.5
+    """Metres of geodesic between the robot and the free floor at the goal."""
+    strict: bool = False
+    """Whether the distance must be below the radius, not at most the radius."""
+    in_room: bool = True
+    """Whether the robot must be in the goal's room."""
+    seen: bool = True
+    """Whether the last panorama must show the goal instance."""
+    by_answer: bool = False
+    """Whether a correct answer decides, and the place is only kept beside it."""
+
+    def reached(self, distance: float) -> bool:
+        """Returns whether a geodesic distance to the goal, metres, is near enough."""
+        return distance < self.radius if self.strict else distance <= self.radius
+
+
+@dataclass(frozen=True)
+class FamilyBudgets(Message):
+    """What a task of a family may take unless the scenario says otherwise."""
+
+    decisions: int = 40
+    simulated_time: float = 1800.0
+    """Simulated seconds."""
+
+
+@dataclass(frozen=True)
+class TaskFamily(Message):
+    """One family of tasks (paper III-A)."""
+
+    name: str = ""
+    meaning: str = ""
+    rules: tuple[SuccessRule, ...] = ()
+    """One for each protocol under which it can be scored, ``home`` first."""
+    answer: str = "none"
+    """``none`` | ``open``: whether the agent answers after its last stop."""
+    budgets: FamilyBudgets = FamilyBudgets()
+
+
+def _radius(protocol: str, radius: float, *, strict: bool, by_answer: bool = False) -> SuccessRule:
+    return SuccessRule(
+        protocol, radius, strict=strict, in_room=False, seen=False, by_answer=by_answer
+    )
+
+
+FAMILY_TABLE: Mapping[str, TaskFamily] = {
+    family.name: family
+    for family in (
+        TaskFamily(
+            "vln",
+            "route instruction",
+            (
+                SuccessRule(),
+                _radius("habitat", 3.0, strict=True),
+                _radius("uni_lavira", 3.0, strict=False),
+            ),
+        ),
+        TaskFamily(
+            "objectnav",
+            "object goal",
+            (
+                SuccessRule(),
+                _radius("habitat", 0.1, strict=True),
+                _radius("ovon", 0.25, strict=True),
+                _radius("uni_lavira", 1.0, strict=True),
+            ),
+        ),
+        TaskFamily(
+            "eqa",
+            "embodied question",
+            (
+                SuccessRule(by_answer=True),
+                _radius("habitat", 3.0, strict=True, by_answer=True),
+                _radius("uni_lavira", 3.0, strict=True, by_answer=True),
+            ),
+            answer="open",
+        ),
+        TaskFamily(
+            "aerial_vln",
+            "flight directive",
+            (
+                SuccessRule(radius=20.0, in_room=False, seen=False),
+                _radius("uni_lavira", 20.0, strict=False),
+            ),
+            # OpenUAV gives a flight at most 70 waypoints.
+            budgets=FamilyBudgets(decisions=70, simulated_time=3600.0),
+        ),
+    )
+}
+FAMILIES = tuple(FAMILY_TABLE)
+"""Route instruction, object goal, embodied question, flight directive (paper III-A)."""
 
 
 @dataclass(frozen=True)
@@ -19,13 +123,48 @@ class TaskSpec(Message):
 
     family: str = "vln"
     text: str = ""
+    choices: tuple[str, ...] = ()
+    """The closed vocabulary of a question's answer; empty when any words will do."""
+
+    @property
+    def answer_type(self) -> str:
+        """``none`` | ``open`` | ``closed``: what the agent gives at the end beside its stop."""
+        return "closed" if self.choices else FAMILY_TABLE[self.family].answer
+
+    @property
+    def success(self) -> SuccessRule:
+        """How a stop is judged under the protocol ``home``."""
+        return success_rule(self.family)
+
+    @property
+    def budgets(self) -> FamilyBudgets:
+        """What the task may take unless the scenario says otherwise."""
+        return FAMILY_TABLE[self.family].budgets
 
 
-def checked_task(text: str, family: str = "vln") -> TaskSpec:
+def asks(family: str) -> bool:
+    """Returns whether the tasks of a family are questions, answered after the last stop."""
+    return FAMILY_TABLE[family].answer != "none"
+
+
+def success_rule(family: str, protocol: str = HOME) -> SuccessRule:
+    """Returns how a task of a family is scored under a protocol.
+
+    Raises:
+        TaskError: if the protocol does not score that family.
+    """
+    rules = {rule.protocol: rule for rule in FAMILY_TABLE[family].rules}
+    if protocol not in rules:
+        raise TaskError(unknown_name(f"protocol of {family!r}", protocol, rules, "task.protocol"))
+    return rules[protocol]
+
+
+def checked_task(text: str, family: str = "vln", choices: Sequence[str] = ()) -> TaskSpec:
     """Returns a task with its spaces folded.
 
     Raises:
-        TaskError: if the text is empty or longer than 2,000 words, or the family is unknown.
+        TaskError: if the text is empty or longer than 2,000 words, the family is unknown, or
+            choices are given for a task without an answer, or fewer than two different ones.
     """
     words = text.split()
     if not words:
@@ -35,6 +174,15 @@ def checked_task(text: str, family: str = "vln") -> TaskSpec:
             f"task: {len(words)} words, at most {MAX_TASK_WORDS} are read; shorten the text "
             f"(it starts {' '.join(words[:6])!r})."
         )
-    if family not in FAMILIES:
+    if family not in FAMILY_TABLE:
         raise TaskError(f"task: unknown family {family!r}; valid: {', '.join(FAMILIES)}.")
-    return TaskSpec(family=family, text=" ".join(words))
+    folded = tuple(" ".join(choice.split()) for choice in choices)
+    if folded and not asks(family):
+        raise TaskError(
+            f"task: choices are for questions; remove them, or set the family {family!r} to 'eqa'."
+        )
+    if folded and (not all(folded) or len({choice.casefold() for choice in folded}) < 2):
+        raise TaskError(
+            f"task: choices {list(folded)} must be two different answers at least, none empty."
+        )
+    return TaskSpec(family=family, text=" ".join(words), choices=folded)

@@ -19,6 +19,7 @@ from unilavira_drake.cli.main import main
 from unilavira_drake.errors import (
     ContextLengthError,
     MllmAuthenticationError,
+    MllmError,
     ReplyRefused,
     ReplyTruncated,
 )
@@ -133,7 +134,9 @@ def test_an_error_is_named(
     assert main(["ask", "--model", served(Listener(error)), "--text", "Hello."]) == 3
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err.startswith(f"{name}: 127.0.0.1:")
+    # The endpoint is named where it is at fault.
+    where = "127.0.0.1:" if isinstance(error, MllmError) else ""
+    assert captured.err.startswith(f"{name}: {where}")
     assert "Traceback" not in captured.err
     assert SECRET not in captured.err
 

@@ -45,7 +45,7 @@ def test_the_header_tells_who_answered_and_when(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CASSETTES)
-def test_an_episode_is_replayed_to_its_end_byte_for_byte(name: str, tmp_path: Path) -> None:
+def test_it_is_replayed_to_its_success_twice_with_the_same_bytes(name: str, tmp_path: Path) -> None:
     results = [replay(name, tmp_path / run) for run in ("first", "second")]
     assert results[0].success
     assert results[0].cause == "stopped"

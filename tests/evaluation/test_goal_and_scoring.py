@@ -17,6 +17,7 @@ from unilavira_drake.evaluation.scoring import make_goal_field, score, shortest_
 from unilavira_drake.messages import Frame, Panorama
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.planning.geodesic import GeodesicField
+from unilavira_drake.tasks import SuccessRule, success_rule
 from unilavira_drake.worlds.world import Box, LabelEntry, Room, World, WorldObject
 
 RADIUS = 0.30
@@ -238,3 +239,27 @@ def test_an_unscored_task_has_no_verdict():
     verdict = score(None, ended(9.0, 1.0, path=3.0), (2.0, 2.0), Panorama())
     assert (verdict.success, verdict.navigation_error_m, verdict.spl) == (None, None, None)
     assert verdict.path_length_m == 3.0
+
+
+def test_a_rule_without_room_and_view_asks_for_the_distance_alone():
+    near_the_door = make_goal_field("7.0,2.0", WORLD, radius=RADIUS)
+    habitat = success_rule("vln", "habitat")
+
+    def success(x, y, rule, goal=TABLE, cause="stopped"):
+        return score(goal, ended(x, y, cause=cause), (2.0, 2.0), panorama(0), rule).success
+
+    assert success(7.0, 2.0, habitat)
+    assert not success(7.0, 2.0, success_rule("vln"))
+    assert not success(7.0, 2.0, habitat, cause="decision_budget")
+    assert success(5.8, 2.0, habitat, near_the_door)
+    assert not success(5.8, 2.0, success_rule("vln"), near_the_door)
+
+
+def test_the_radius_of_the_rule_is_that_of_success_and_of_oracle_success():
+    field = make_goal_field("1.0,1.0", WORLD, radius=RADIUS)
+    away = field.distances(3.0, 1.0)[0]
+    for strict in (True, False):
+        rule = SuccessRule("exact", away, strict=strict, in_room=False, seen=False)
+        for x, y, near in ((3.0, 1.0, not strict), (2.9, 1.0, True), (3.1, 1.0, False)):
+            verdict = score(field, ended(x, y, nearest=9.0), (5.0, 1.0), Panorama(), rule)
+            assert (verdict.success, verdict.oracle_success) == (near, near)

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from unilavira_drake.evaluation.goal_area import success_area
-from unilavira_drake.evaluation.scoring import SUCCESS_DISTANCE, GoalField, make_goal_field
+from unilavira_drake.evaluation.scoring import HOME_RULE, GoalField, make_goal_field
+from unilavira_drake.tasks import SuccessRule, success_rule
 from unilavira_drake.worlds.load import load_world
 
 FLAT = load_world("flat")
@@ -32,10 +33,20 @@ def test_the_area_is_where_a_stop_succeeds(goal: GoalField) -> None:
             room is not None
             and room.name in rooms
             and any(
-                room.name in target.rooms and distance <= SUCCESS_DISTANCE
+                room.name in target.rooms and HOME_RULE.reached(distance)
                 for target, distance in zip(goal.targets, goal.distances(x, y), strict=True)
             )
         )
         inside_count += succeeds
         assert succeeds == (margin > 0), (x, y, margin)
     assert inside_count > 30
+
+
+def test_a_rule_without_a_room_widens_the_area_beyond_it() -> None:
+    field = make_goal_field("study", FLAT, radius=0.36)
+
+    def area(rule: SuccessRule) -> float:
+        return sum(cv2.contourArea(np.float32(outline)) for outline in success_area(field, rule))
+
+    home, wide = area(success_rule("vln")), area(success_rule("vln", "habitat"))
+    assert wide > home + 1.0

@@ -66,9 +66,7 @@ def test_a_picture_after_each_keyframe_travel() -> None:
     assert [i for i in range(1, 20) if counts[i] > counts[i - 1]] == [4, 9, 14, 19]
     first, *others = way.state.pictures
     assert (first.label, first.n) == ("H1: front view at waypoint 1", 1)
-    assert {p.label.partition(": ")[2] for p in others} == {
-        "leaving waypoint 1 by its left view"
-    }
+    assert {p.label.partition(": ")[2] for p in others} == {"leaving waypoint 1 by its left view"}
 
 
 def test_a_picture_when_the_view_has_turned() -> None:

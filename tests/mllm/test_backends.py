@@ -25,7 +25,7 @@ def test_a_profile_a_file_and_an_address_are_remote_models(tmp_path: Path) -> No
     for spec, name in (
         ("gemini-3.1-pro", "gemini-3.1-pro"),
         (str(own), "mine"),
-        ("openai:m@http://127.0.0.1:9/v1", "openai:m@http://127.0.0.1:9/v1"),
+        ("openai:m@http://127.0.0.1:9/v1", "openai:m"),
     ):
         model = made(spec)
         assert isinstance(model, RemoteModel)

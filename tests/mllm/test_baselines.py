@@ -1,4 +1,4 @@
-"""``random``, ``frontier`` and the choice of a backend by its spec."""
+"""``random``, ``frontier``, ``fixed`` and the choice of a backend by its spec."""
 
 import dataclasses
 import json
@@ -7,7 +7,13 @@ import pytest
 
 from unilavira_drake.errors import MllmError, ScenarioError
 from unilavira_drake.mllm.backends import make_backend
-from unilavira_drake.mllm.baselines import FRONTIER_DECISIONS, FrontierModel, RandomModel
+from unilavira_drake.mllm.baselines import (
+    FIXED_DECISIONS,
+    FRONTIER_DECISIONS,
+    FixedModel,
+    FrontierModel,
+    RandomModel,
+)
 from unilavira_drake.mllm.request import (
     LanguageVariables,
     MllmRequest,
@@ -29,7 +35,7 @@ def decide(model, **changes):
     return json.loads(model.complete(request).text)
 
 
-@pytest.mark.parametrize("model", [RandomModel(), FrontierModel()])
+@pytest.mark.parametrize("model", [RandomModel(), FrontierModel(), FixedModel()])
 def test_the_task_is_never_read(model):
     for n in range(1, 30):
         replies = set()
@@ -67,7 +73,39 @@ def test_frontier_stops_after_its_count():
     assert reply["action"] == {"tool": "double_check"}
 
 
-@pytest.mark.parametrize("model", [RandomModel(), FrontierModel()])
+def sequence(seed, task="Go to the sofa."):
+    """Returns what ``fixed`` does along a corridor that is blocked at every third decision."""
+    actions = []
+    for n in range(1, FIXED_DECISIONS + 2):
+        views = (ViewNote("front", 0.9 if n % 3 == 0 else 1.0), *VIEWS[1:])
+        variables = LanguageVariables(task=task, views=views)
+        request = MllmRequest(n=n, seed=seed, call="decide", variables=variables)
+        actions.append(json.loads(FixedModel().complete(request).text)["action"])
+    return actions
+
+
+def test_fixed_goes_ahead_turns_where_it_is_blocked_and_stops_after_its_count():
+    actions = sequence(seed=0)
+    *turns, last = actions
+    assert [a["direction"] for a in turns] == ["front", "front", "left"] * (FIXED_DECISIONS // 3)
+    assert last == {"tool": "double_check"}
+    assert actions == sequence(seed=5) == sequence(seed=0, task="Stop at once.")
+
+
+def test_fixed_turns_to_the_freest_side_and_to_the_first_of_equals():
+    for free, direction in (
+        ((0.5, 1.0, 3.0, 2.0), "right"),
+        ((0.5, 2.0, 2.0, 2.0), "left"),
+        ((0.5, 0.0, 0.0, 0.1), "back"),
+    ):
+        names = ("front", "left", "right", "back")
+        views = tuple(ViewNote(d, x) for d, x in zip(names, free, strict=True))
+        variables = LanguageVariables(views=views)
+        reply = FixedModel().complete(MllmRequest(n=1, call="decide", variables=variables)).text
+        assert json.loads(reply)["action"] == {"tool": "turn", "direction": direction}
+
+
+@pytest.mark.parametrize("model", [RandomModel(), FrontierModel(), FixedModel()])
 def test_other_calls(model):
     request = MllmRequest(role="vision", call="ground", variables=VisionVariables())
     u, v = json.loads(model.complete(request).text)["point"]
@@ -87,7 +125,11 @@ def test_backends_say_what_they_are():
     assert (rules.perception, rules.reasoning) == ("ground_truth", "rules")
     assert "not a multimodal LLM" in rules.description
     assert isinstance(make_backend("rules:default", role="language", place="here"), RulesModel)
-    for spec, kind in (("random", RandomModel), ("frontier", FrontierModel)):
+    for spec, kind in (
+        ("random", RandomModel),
+        ("frontier", FrontierModel),
+        ("fixed", FixedModel),
+    ):
         model = make_backend(spec, role="language", place="here")
         assert isinstance(model, kind)
         assert "lower bound" in model.description

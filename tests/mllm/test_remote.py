@@ -16,10 +16,12 @@ from tiny_model import DECIDE, GROUND, model_of, profile_of
 from wire_faults import FAULTS
 
 from unilavira_drake.errors import (
+    ContextLengthError,
     MllmAuthenticationError,
     MllmError,
     MllmQuotaError,
     MllmRequestError,
+    MllmTimeout,
     MllmUnreachable,
     ReplyTruncated,
 )
@@ -30,7 +32,7 @@ from unilavira_drake.mllm.http import HttpClient
 from unilavira_drake.mllm.openai_compatible import OpenAiDialect
 from unilavira_drake.mllm.prompt import Prompt
 from unilavira_drake.mllm.remote import RemoteModel
-from unilavira_drake.mllm.request import MllmRequest
+from unilavira_drake.mllm.request import ImagePart, MllmRequest
 
 KEY = "sk-secret/0123456789"
 DIALECTS = pytest.mark.parametrize("dialect", ["gemini", "openai"])
@@ -117,6 +119,37 @@ def test_a_reask_is_warmer_and_tells_what_was_wrong(
     assert generation(dialect, second)["temperature"] == pytest.approx(0.3)
     assert "index 7 is not there" in str(second)
     assert "index 7 is not there" not in str(first)
+
+
+@DIALECTS
+def test_a_prompt_that_is_too_long_is_sent_once_without_the_past(
+    dialect: str, server: FaultServer, http: HttpClient
+) -> None:
+    base_url = server.base_url("context_400")
+    jpeg = GROUND.images[0].jpeg
+    labels = ("H1: front view at waypoint 1", "H2: leaving waypoint 1 by its left view")
+    views = tuple(f"view {word}" for word in ("front", "left", "right", "back"))
+    images = tuple(ImagePart(label, jpeg) for label in (*labels, *views))
+    request = dataclasses.replace(DECIDE, images=images)
+    with pytest.raises(ContextLengthError) as caught:
+        model_of(profile_of(dialect, base_url), http, "language").complete(request)
+    first, second = (str(post) for post in server.visit(base_url).posts)
+    assert all(label in first for label in labels)
+    assert not any(label in second for label in labels)
+    assert len(caught.value.attempts) == 2
+
+
+@DIALECTS
+def test_a_reask_has_the_time_that_is_left_of_its_decision(
+    dialect: str, server: FaultServer, http: HttpClient
+) -> None:
+    model = model_of(profile_of(dialect, server.base_url("hang"), deadline=1.0, attempt=0.7), http)
+    with pytest.raises(MllmTimeout):
+        model.complete(GROUND)
+    began = time.monotonic()
+    with pytest.raises(MllmTimeout):
+        model.complete(dataclasses.replace(GROUND, attempt=1, feedback="again"))
+    assert time.monotonic() - began < 0.6
 
 
 @DIALECTS

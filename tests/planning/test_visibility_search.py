@@ -15,17 +15,17 @@ from unilavira_drake.planning.visibility_any_angle import (
     UNREACHABLE,
     any_angle_path,
 )
-from unilavira_drake.planning.visibility_graph import visibility_path
+from unilavira_drake.planning.visibility_graph import corner_path
 from unilavira_drake.planning.visibility_lines import (
     STRAIGHT,
     edge,
     edge_cost,
     path_cost,
     sees,
-    shorten,
     slopes_of,
     unfold,
 )
+from unilavira_drake.planning.visibility_path import shorten
 from unilavira_drake.planning.visibility_window import FlightWindow, reachable
 
 ANY = slopes_of(math.pi / 2, math.pi / 2)
@@ -184,7 +184,7 @@ def test_far_routes_use_corners_and_are_never_longer():
         outcome, nodes = any_angle_path(window.words, start, goal, ANY, 2**16)
         assert outcome == FOUND
         nodes = shorten(window.words, nodes, ANY, 10)
-        corners = visibility_path(window.words, nodes, ANY)
+        corners = corner_path(window.words, nodes, ANY)
         assert free_path(dense, corners)
         assert path_cost(corners, ANY) <= path_cost(nodes, ANY) + 1e-9
         better += path_cost(corners, ANY) < path_cost(nodes, ANY) - 1e-6

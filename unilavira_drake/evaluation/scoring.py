@@ -1,7 +1,8 @@
 """Scoring: success, navigation error and SPL, from the truth and never from the agent.
 
-Success: the agent ended by its own verified stop, at most ``SUCCESS_DISTANCE`` of geodesic from
-the free floor at the goal, in the goal's room, and with the goal instance in its last panorama.
+Success: the agent ended by its own verified stop, and the stop keeps the task's
+``tasks.SuccessRule``: near enough to the free floor at the goal by geodesic distance and, where the
+rule says so, in the goal's room and with the goal instance in its last panorama.
 SPL = success * l / max(l, p) with the shortest way l and the way gone p (Anderson et al., "On
 Evaluation of Embodied Navigation Agents", 2018).
 """
@@ -19,10 +20,10 @@ from unilavira_drake.evaluation.goal import GoalTarget, footprint, resolve_goal
 from unilavira_drake.messages import Message, Panorama
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.planning.geodesic import GeodesicField
+from unilavira_drake.tasks import SuccessRule
 from unilavira_drake.worlds.world import World
 
-SUCCESS_DISTANCE = 1.5
-"""Metres of geodesic between the robot and the free floor at the goal."""
+HOME_RULE = SuccessRule()
 LOOSE_DISTANCE = 3.0
 """The radius common in the literature, printed beside, metres."""
 SEEN_PIXELS = 60
@@ -63,10 +64,12 @@ class Score(Message):
     shortest_path_m: float | None = None
     spl: float | None = None
     oracle_success: bool | None = None
-    """Whether the robot ever was within the success distance."""
+    """Whether the robot ever was within the rule's radius."""
     same_room: bool | None = None
     goal_seen: bool | None = None
     answer_correct: bool | None = None
+    answer_score: float | None = None
+    """A judge's mark from 0 to 1; None without a judge."""
     notes: tuple[str, ...] = ()
     """Why a figure is not defined."""
 
@@ -109,6 +112,7 @@ def score(
     metrics: EpisodeMetrics,
     start: tuple[float, float],
     panorama: Panorama,
+    rule: SuccessRule = HOME_RULE,
 ) -> Score:
     """Returns the verdict on an episode.
 
@@ -117,6 +121,7 @@ def score(
         metrics: at the end of the episode.
         start: position of the base at the start, metres.
         panorama: the last one.
+        rule: what makes a stop a success; what an answer makes of it: ``answers.score_answer``.
 
     Raises:
         TaskError: if the start cannot be one.
@@ -130,9 +135,9 @@ def score(
     stopped = metrics.cause == "stopped"
     nearest = goal.targets[distances.index(error)]
     success = stopped and any(
-        distance <= SUCCESS_DISTANCE
-        and in_room(target, goal.world, x, y)
-        and seen(target, panorama) is not False
+        rule.reached(distance)
+        and (not rule.in_room or in_room(target, goal.world, x, y))
+        and (not rule.seen or seen(target, panorama) is not False)
         for target, distance in zip(goal.targets, distances, strict=True)
     )
     spl, notes = _spl(success, shortest, metrics.path_length)
@@ -146,7 +151,7 @@ def score(
         path_length_m=metrics.path_length,
         shortest_path_m=shortest if math.isfinite(shortest) else None,
         spl=spl,
-        oracle_success=min(closest, error) <= SUCCESS_DISTANCE,
+        oracle_success=rule.reached(min(closest, error)),
         same_room=in_room(nearest, goal.world, x, y),
         goal_seen=seen(nearest, panorama),
         notes=notes,

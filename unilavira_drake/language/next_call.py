@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from unilavira_drake.messages import LanguageAction, Outcome
+from unilavira_drake.tasks import asks
 
 
 def next_call(last: LanguageAction, outcome: Outcome, *, family: str, has_todo: bool) -> str:
@@ -15,7 +16,7 @@ def next_call(last: LanguageAction, outcome: Outcome, *, family: str, has_todo: 
     ``backtrack``, arrived         ``recover`` (paper III-D)
     ``backtrack``, failed          ``decide``
     ``double_check``               ``double_check``
-    confirmed, family ``eqa``      ``answer``
+    confirmed, a question          ``answer``
     anything else                  ``decide``
     =============================  ==============================================
     """
@@ -25,6 +26,6 @@ def next_call(last: LanguageAction, outcome: Outcome, *, family: str, has_todo: 
         return "recover"
     if last.tool == "double_check":
         return "double_check"
-    if last.call == "double_check" and last.confirmed and family == "eqa":
+    if last.call == "double_check" and last.confirmed and asks(family):
         return "answer"
     return "decide"

@@ -22,6 +22,7 @@ from unilavira_drake.mllm.reply_forms import (
 )
 from unilavira_drake.mllm.reply_model import ReplyModel, bounded, clipped
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
+from unilavira_drake.tasks import asks
 
 MAX_PLAN_ITEMS = 32
 REASONING_LIMIT = 1500
@@ -90,7 +91,7 @@ def _verdict(
     reason = bounded(reply.reason, REASON_LIMIT, "reason")
     if not reply.confirmed and not reason:
         raise ReplyFormatError("confirmed is false and reason is empty; say what is missing.")
-    stops = reply.confirmed and variables.family != "eqa"
+    stops = reply.confirmed and not asks(variables.family)
     return LanguageAction(
         n=request.n,
         call=request.call,

@@ -21,6 +21,7 @@ from unilavira_drake.messages import (
 )
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.request import (
+    VIEW_LABEL,
     DecisionNote,
     ImagePart,
     LanguageVariables,
@@ -89,7 +90,9 @@ def language_request(
         call=call,
         variables=variables,
         images=_past_images(history, failed_frames, history_detail)
-        + tuple(ImagePart(f"view {d}", panorama.frame(d).jpeg, view_detail) for d in DIRECTIONS),
+        + tuple(
+            ImagePart(f"{VIEW_LABEL}{d}", panorama.frame(d).jpeg, view_detail) for d in DIRECTIONS
+        ),
         evidence=None
         if detector is None
         else tuple(detector(panorama.frame(direction)) for direction in DIRECTIONS),

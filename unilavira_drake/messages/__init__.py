@@ -8,6 +8,7 @@ from unilavira_drake.messages.actions import (
     VisionAction,
 )
 from unilavira_drake.messages.frozen import Message, read_only
+from unilavira_drake.messages.grounding import Candidate, Grounding
 from unilavira_drake.messages.memory import (
     DecisionRecord,
     Edge,
@@ -45,10 +46,12 @@ __all__ = [
     "TERMINAL_STATES",
     "TOOLS",
     "VIEW_YAW",
+    "Candidate",
     "DecisionRecord",
     "Edge",
     "Frame",
     "Goal",
+    "Grounding",
     "History",
     "Intrinsics",
     "KeyPicture",

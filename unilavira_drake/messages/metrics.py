@@ -18,7 +18,7 @@ CAUSES = {
     "token_budget": "The tokens of the budget are used up.",
     "model_time_budget": "The models have taken all the seconds of the budget.",
     "cost_budget": "The money of the budget is spent.",
-    "stalled": "For the stall time no panorama, action, status or motion was new.",
+    "stalled": "For the stall time nothing was new: no panorama, action, status, motion or reply.",
     UNREACHABLE: "A model could not be reached or gave no reply; nothing is scored.",
     "interrupted": "A person stopped the run; what was done until then is kept.",
 }

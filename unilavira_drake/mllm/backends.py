@@ -6,19 +6,19 @@ from collections.abc import Callable
 from pathlib import Path
 
 from unilavira_drake.errors import InputError, ScenarioError, unknown_name
-from unilavira_drake.mllm.baselines import FrontierModel, RandomModel
+from unilavira_drake.mllm.baselines import FixedModel, FrontierModel, RandomModel
 from unilavira_drake.mllm.mailbox import MailboxModel
 from unilavira_drake.mllm.profile import Profile
 from unilavira_drake.mllm.profiles import AD_HOC, load_profile, profile_names
 from unilavira_drake.mllm.remote import RemoteModel
 from unilavira_drake.mllm.replay import CassetteModel
 from unilavira_drake.mllm.reply import Mllm
-from unilavira_drake.mllm.rules import RulesModel
+from unilavira_drake.mllm.rules import RulesModel, read_dials
 from unilavira_drake.resources import cassettes_path
 
 SPECS = (
-    "rules[:PRESET] | random | frontier | cassette:FILE | mailbox:DIR | PROFILE | PROFILE.yaml | "
-    "openai:MODEL@BASE_URL"
+    "rules[:PRESET|:DIAL=VALUE,...] | random | frontier | fixed | cassette:FILE | mailbox:DIR | "
+    "PROFILE | PROFILE.yaml | openai:MODEL@BASE_URL"
 )
 """What a spec may be, for help texts; FILE may be the bare name of a cassette that comes with the
 package."""
@@ -27,11 +27,10 @@ _PROGRAMS: dict[str, Callable[[], Mllm]] = {
     "rules": RulesModel,
     "random": RandomModel,
     "frontier": FrontierModel,
+    "fixed": FixedModel,
 }
 _FOLDERS = {"cassette": "cassette:FILE", "mailbox": "mailbox:DIR"}
 _FILES = (".yaml", ".yml")
-PRESETS: dict[str, tuple[str, ...]] = {"rules": ("default",)}
-"""Backend -> what may follow its name after a colon."""
 
 
 def make_backend(spec: str, *, role: str, place: str) -> Mllm:
@@ -63,10 +62,14 @@ def make_backend(spec: str, *, role: str, place: str) -> Mllm:
     if name not in _PROGRAMS:
         names = (*_PROGRAMS, *_FOLDERS.values(), f"{AD_HOC}MODEL@BASE_URL", *profile_names())
         raise ScenarioError(unknown_name("model", spec, names, place))
-    presets = PRESETS.get(name, ())
-    if spec != name and rest not in presets:
-        raise ScenarioError(unknown_name(f"preset of {name!r}", rest, presets, place))
-    return _PROGRAMS[name]()
+    if spec == name:
+        return _PROGRAMS[name]()
+    if name != "rules":
+        raise ScenarioError(f"{place}: {name!r} takes no preset and no dials: {spec!r}.")
+    try:
+        return RulesModel(read_dials(rest))
+    except InputError as error:
+        raise ScenarioError(f"{place}: {error}") from None
 
 
 def _shipped_cassettes() -> dict[str, Path]:

@@ -1,6 +1,6 @@
-"""Lower bounds: a model that chooses at random, and one that goes where it has not been.
+"""Lower bounds: a random choice, the nearest unvisited floor, and always the same moves.
 
-Both speak the same replies as every other model and neither reads the task.
+They speak the same replies as every other model and none of them reads the task.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ STOP_CHANCE = 0.1
 """Chance that ``random`` asks to stop, at each decision."""
 FRONTIER_DECISIONS = 12
 """``frontier`` stops after this many decisions."""
+FIXED_DECISIONS = 12
+"""``fixed`` stops after this many decisions."""
 _LEAST_FREE = 1.0
+"""A view with less free floor along its axis is blocked, metres."""
 _FLOOR_ROW = 0.62
 """Share of the image height at which floor a few metres ahead is looked for."""
 
@@ -78,8 +81,7 @@ class FrontierModel:
         """
         variables = request.variables
         if isinstance(variables, VisionVariables):
-            u, v = variables.width / 2.0, _FLOOR_ROW * variables.height
-            return _completion(_point(u, v, "floor ahead", variables))
+            return _completion(_floor_ahead(variables))
         if isinstance(variables, LanguageVariables) and request.call in ("decide", "recover"):
             if request.n > FRONTIER_DECISIONS:
                 return _completion(_action({"tool": "double_check"}, "enough was seen"))
@@ -90,6 +92,47 @@ class FrontierModel:
 
     def close(self) -> None:
         """Does nothing: there are no connections."""
+
+
+class FixedModel:
+    """Goes ahead until the way is blocked, then the freest other way; stops after a fixed count.
+
+    Neither the task nor the seed, the pictures or the history change what it does.
+    """
+
+    name = "fixed"
+    perception = "images"
+    reasoning = "rules"
+    box_space = "pixels"
+    deadline = 60.0
+    description = "always the same moves, whatever the task: a lower bound"
+
+    def complete(self, request: MllmRequest) -> Completion:
+        """Answers a request; equal free distances get equal replies.
+
+        Raises:
+            MllmError: if the call is unknown.
+        """
+        variables = request.variables
+        if isinstance(variables, VisionVariables):
+            return _completion(_floor_ahead(variables))
+        if isinstance(variables, LanguageVariables) and request.call in ("decide", "recover"):
+            if request.n > FIXED_DECISIONS:
+                return _completion(_action({"tool": "double_check"}, "the sequence is over"))
+            action = {"tool": "turn", "direction": _straight_on(variables)}
+            return _completion(_action(action, "ahead, or the freest other way"))
+        return _completion(_fixed_reply(request.call, self.name))
+
+    def close(self) -> None:
+        """Does nothing: there are no connections."""
+
+
+def _straight_on(variables: LanguageVariables) -> str:
+    """Returns ``front``, or where that is blocked the freest of left, right and back."""
+    free = {view.direction: view.free_distance for view in variables.views}
+    if free.get("front", 0.0) >= _LEAST_FREE:
+        return "front"
+    return max(("left", "right", "back"), key=lambda direction: free.get(direction, 0.0))
 
 
 def _frontier(variables: LanguageVariables, generator: random.Random) -> str:
@@ -130,6 +173,11 @@ def _point(u: float, v: float, target: str, variables: VisionVariables) -> dict[
         "confidence": None,
         "reason": "chosen without looking at the picture",
     }
+
+
+def _floor_ahead(variables: VisionVariables) -> dict[str, Any]:
+    u, v = variables.width / 2.0, _FLOOR_ROW * variables.height
+    return _point(u, v, "floor ahead", variables)
 
 
 def _action(action: dict[str, Any], why: str) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import collections
 import contextlib
-import dataclasses
 import threading
 import time
 from collections.abc import Callable
@@ -198,8 +197,9 @@ class Broker:
         told: Any = getattr(outcome, "latency", None)
         latency = call.age if told is None else float(told)
         attempts: Any = tuple(getattr(outcome, "attempts", ()))
+        if isinstance(outcome, OSError):  # A mailbox or a cassette that cannot be read any more.
+            outcome = MllmError(f"{self._backend.name}: {outcome}")
         if isinstance(outcome, Completion):
-            outcome = dataclasses.replace(outcome, latency=latency)
             status, usage, detail = "ok", outcome.usage, ""
         else:
             given_up = self._closed and isinstance(outcome, MllmError)
@@ -208,7 +208,9 @@ class Broker:
         try:
             own = Attempt(self._backend.name, status, None, usage, latency, detail)
             self._report(call, attempts or (own,))
-        except BaseException as error:  # A full disk; raised where the reply is read.
+        except OSError as error:  # A full disk.
+            outcome = MllmError(f"the ledger cannot be written: {error}")
+        except BaseException as error:  # A bug is raised where the reply is read.
             outcome = error
         self._settle(call, outcome, latency)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from unilavira_drake.mllm.prompt import Prompt
 
-LOOK_TOLERANCE = 6
+LOOK_TOLERANCE = 3
 """Grey levels by which a field of a picture's look may differ."""
 BEARING_STEP = 5
 """Degrees to which bearings in a prompt are rounded."""

@@ -78,7 +78,7 @@ def _ad_hoc(spec: str, place: str) -> Profile:
     spaces = [space for family, space in _FAMILY_SPACES if family.search(model)]
     _check_url(url, f"{place}: {AD_HOC}{model}@BASE_URL")
     return Profile(
-        name=f"{AD_HOC}{model}@{url}",
+        name=f"{AD_HOC}{model}",
         description=f"{model}, an OpenAI-compatible server at {urlsplit(url).netloc}",
         dialect="openai",
         base_url=url,

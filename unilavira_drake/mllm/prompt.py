@@ -22,7 +22,13 @@ import jinja2
 
 from unilavira_drake.messages import Message
 from unilavira_drake.mllm.boxes import BOX_SPACES
-from unilavira_drake.mllm.request import FreeVariables, ImagePart, MllmRequest, VisionVariables
+from unilavira_drake.mllm.request import (
+    VIEW_LABEL,
+    FreeVariables,
+    ImagePart,
+    MllmRequest,
+    VisionVariables,
+)
 from unilavira_drake.resources import prompts_path
 
 
@@ -80,7 +86,7 @@ def compose_prompt(request: MllmRequest) -> Prompt:
         values["places"] = BOX_SPACES[variables.box_space].rule(variables.width, variables.height)
     else:
         directions = [view.direction for view in variables.views]
-    labels = {f"view {direction}" for direction in directions}
+    labels = {f"{VIEW_LABEL}{direction}" for direction in directions}
     places = tuple(Place(image.label, index) for index, image in enumerate(request.images))
     values |= {
         "feedback": request.feedback,
@@ -90,6 +96,15 @@ def compose_prompt(request: MllmRequest) -> Prompt:
     system = _rendered(f"{request.role}/system.txt.j2", values)
     text = _rendered(f"{request.role}/{request.call}.txt.j2", values)
     return Prompt(system, _placed(text, request.images))
+
+
+def template_text(template: str, **values: object) -> str:
+    """Returns the text of a template that is sent word for word, outside of any episode.
+
+    Raises:
+        jinja2.TemplateError: if there is no such template, or it names a value that is not given.
+    """
+    return _rendered(template, values)
 
 
 def _rendered(template: str, values: dict[str, object]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
+
 import pydantic
 
 from unilavira_drake.errors import MllmError
@@ -19,6 +21,8 @@ from unilavira_drake.mllm.reply import Completion
 from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.mllm.retrying import RetryPolicy
 from unilavira_drake.mllm.wire import WireDialect
+
+_DECISIONS_KEPT = 64
 
 _DIALECTS: dict[Dialect, type[WireDialect]] = {"gemini": GeminiDialect, "openai": OpenAiDialect}
 
@@ -56,6 +60,8 @@ class RemoteModel:
         self._retries = retries or RetryPolicy()
         self._breaker = breaker
         self._cancellation = Cancellation()
+        self._spent: OrderedDict[tuple[int, int], float] = OrderedDict()
+        """Seconds that the earlier attempts at a decision took, by (seed, n)."""
 
     @property
     def name(self) -> str:
@@ -86,7 +92,10 @@ class RemoteModel:
 
     @property
     def deadline(self) -> float:
-        """Wall-clock seconds for a call, waiting for an absent endpoint included."""
+        """Wall-clock seconds for a decision, waiting for an absent endpoint included.
+
+        A re-ask has what the attempt before it has left.
+        """
         return self._profile.settings(self._role).deadline + self._profile.outage_patience
 
     def complete(self, request: MllmRequest) -> Completion:
@@ -122,7 +131,15 @@ class RemoteModel:
             policy=self._retries,
             cancellation=self._cancellation,
         )
-        return RemoteCall(line, request, self._find_key()).run()
+        decision = (request.seed, request.n)
+        spent = self._spent.get(decision, 0.0) if request.attempt else 0.0
+        call = RemoteCall(line, request, self._find_key(), spent=spent)
+        try:
+            return call.run()
+        finally:
+            self._spent[decision] = spent + call.seconds
+            while len(self._spent) > _DECISIONS_KEPT:
+                self._spent.popitem(last=False)
 
     def close(self) -> None:
         """Breaks off the calls under way; the model is not asked again."""

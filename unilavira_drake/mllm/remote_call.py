@@ -13,6 +13,7 @@ from typing import Any
 import pydantic
 
 from unilavira_drake.errors import (
+    ContextLengthError,
     MllmAuthenticationError,
     MllmError,
     MllmRequestError,
@@ -31,7 +32,7 @@ from unilavira_drake.mllm.profile import Profile, StructuredMode
 from unilavira_drake.mllm.prompt import compose_prompt
 from unilavira_drake.mllm.rate_limit import RateLimit
 from unilavira_drake.mllm.reply import Attempt, Completion, Usage
-from unilavira_drake.mllm.request import MllmRequest
+from unilavira_drake.mllm.request import VIEW_LABEL, MllmRequest
 from unilavira_drake.mllm.retrying import CallClock, Retries, RetryPolicy, TryFailed
 from unilavira_drake.mllm.structured_modes import step_down, structured_mode
 from unilavira_drake.mllm.tokens import estimated_tokens
@@ -61,9 +62,20 @@ class Line:
 
 
 class RemoteCall:
-    """One call; used once."""
+    """One call; used once.
 
-    def __init__(self, line: Line, request: MllmRequest, key: pydantic.SecretStr | None) -> None:
+    Args:
+        spent: seconds of the decision's deadline that are gone.
+    """
+
+    def __init__(
+        self,
+        line: Line,
+        request: MllmRequest,
+        key: pydantic.SecretStr | None,
+        *,
+        spent: float = 0.0,
+    ) -> None:
         self._line = line
         self._key = key
         profile = line.profile
@@ -77,8 +89,14 @@ class RemoteCall:
         if request.attempt > 0:
             self._temperature = min(self._temperature + profile.reask_temperature, 2.0)
         self._max_output_tokens = self._settings.max_output_tokens
-        self._clock = CallClock(self._settings.deadline, profile.outage_patience)
+        left = max(self._settings.deadline - spent, 0.0)
+        self._clock = CallClock(left, profile.outage_patience)
         self._attempts: list[Attempt] = []
+
+    @property
+    def seconds(self) -> float:
+        """Wall-clock seconds since the call began."""
+        return self._clock.elapsed
 
     def run(self) -> Completion:
         """Returns the reply.
@@ -118,12 +136,23 @@ class RemoteCall:
                 doubled = True
                 self._max_output_tokens *= 2
                 continue
+            if issubclass(outcome.error, ContextLengthError) and self._leave_past_out():
+                continue
             raise TryFailed(
                 outcome,
                 away=_is_away(outcome, status),
                 loading=_is_loading(outcome, status),
                 seconds=self._attempts[-1].latency,
             )
+
+    def _leave_past_out(self) -> bool:
+        """Drops the pictures of the past, once; returns whether there were any."""
+        now = tuple(image for image in self._request.images if image.label.startswith(VIEW_LABEL))
+        if not now or len(now) == len(self._request.images):
+            return False
+        self._request = dataclasses.replace(self._request, images=now)
+        self._prompt = compose_prompt(self._request)
+        return True
 
     def _wait_for_breaker(self) -> None:
         breaker = self._line.breaker
@@ -202,8 +231,10 @@ class RemoteCall:
         """A failure's message as a person should read it."""
         if isinstance(outcome, WireReply):
             return outcome
-        host = host_of(self._line.url)
-        message = outcome.message if host in outcome.message else f"{host}: {outcome.message}"
+        host, message = host_of(self._line.url), outcome.message
+        # A reply's own fault is told in the re-ask, and no address belongs in a prompt.
+        if host not in message and not issubclass(outcome.error, ReplyFormatError):
+            message = f"{host}: {message}"
         if issubclass(outcome.error, MllmAuthenticationError):
             names = f"{ROLE_KEYS[self._line.role]} or {SHARED_KEY}"
             message += f" Check {names}." if self._key else f" No key was sent; set {names}."

@@ -76,7 +76,8 @@ class MllmReply(Message):
     attempt: int = 0
     text: str = ""
     error: str = ""
-    """The error's name and words, e.g. ``MllmTimeout: no reply within 150 s.``."""
+    """The name and the words of the model's own error, e.g. ``ReplyRefused: ...``; of any other
+    error the name alone, for its words tell of addresses, files and times of the day."""
     usage: Usage = Usage()
     latency: float = 0.0
     """Simulated seconds from request to reply."""

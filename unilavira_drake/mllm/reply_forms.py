@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 
-from unilavira_drake.mllm.reply_model import Number, ReplyModel, Share, Whole
+from unilavira_drake.mllm.reply_model import Mark, Number, ReplyModel, Share, Whole
 
 
 class UpdateOp(ReplyModel):
@@ -126,6 +126,13 @@ class GroundReply(ReplyModel):
     reason: str
 
 
+class JudgeReply(ReplyModel):
+    """Reply to ``judge``: how well an answer agrees with the expected one, offline."""
+
+    reasoning: str
+    score: Mark
+
+
 REPLY_MODELS: dict[str, type[ReplyModel]] = {
     "plan_todo": PlanReply,
     "decide": ActionReply,
@@ -133,6 +140,7 @@ REPLY_MODELS: dict[str, type[ReplyModel]] = {
     "double_check": VerdictReply,
     "answer": AnswerReply,
     "ground": GroundReply,
+    "judge": JudgeReply,
 }
 """Call -> the form of its reply; the call ``free`` has none."""
 

@@ -43,6 +43,8 @@ Share = Annotated[
     float, pydantic.Field(ge=0.0, le=1.0), pydantic.BeforeValidator(_decimal_from_text)
 ]
 """A number from 0 to 1, also when it is given as text."""
+Mark = Annotated[int, pydantic.Field(ge=1, le=5), pydantic.BeforeValidator(_whole_from_text)]
+"""A whole number from 1 to 5, also when it is given as text."""
 
 
 class ReplyModel(pydantic.BaseModel):

@@ -115,6 +115,10 @@ class FreeVariables(Message):
     text: str = ""
 
 
+VIEW_LABEL = "view "
+"""Begins the label of a picture that was taken just now; the direction follows."""
+
+
 @dataclass(frozen=True)
 class ImagePart(Message):
     """A labelled JPEG image of a request."""

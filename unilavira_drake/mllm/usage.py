@@ -26,7 +26,10 @@ class ModelUsage(Message):
     seconds: float = 0.0
     """That the model took, wall-clock or as recorded; no part of a transcript."""
     failure: str = ""
-    """The first error that was not the model's own; empty while the model can be reached."""
+    """The first error that was not the model's own, in words; empty while the model can be
+    reached; no part of a transcript."""
+    asked: int = 0
+    """Requests issued; more than ``calls`` while a model thinks."""
 
     def __add__(self, other: ModelUsage) -> ModelUsage:
         return ModelUsage(
@@ -37,15 +40,26 @@ class ModelUsage(Message):
             self.spent_usd + other.spent_usd,
             self.seconds + other.seconds,
             self.failure or other.failure,
+            self.asked + other.asked,
         )
+
+    @property
+    def thinking(self) -> bool:
+        """Whether a request is not answered yet."""
+        return self.asked > self.calls
 
     @property
     def tokens(self) -> int:
         """Tokens in and out."""
         return self.total.input_tokens + self.total.output_tokens
 
-    def after(self, reply: MllmReply, *, attempts: int, seconds: float) -> ModelUsage:
-        """Returns the totals with one more reply, its attempts and the seconds that it took."""
+    def after(
+        self, reply: MllmReply, *, attempts: int, seconds: float, failure: str = ""
+    ) -> ModelUsage:
+        """Returns the totals with one more reply, its attempts and the seconds that it took.
+
+        ``failure`` is the error in its place in words, if that was not the model's own.
+        """
         return self + ModelUsage(
             calls=1,
             errors=int(bool(reply.error)),
@@ -53,7 +67,7 @@ class ModelUsage(Message):
             total=reply.usage,
             spent_usd=reply.usage.cost_usd or 0.0,
             seconds=seconds,
-            failure=reply.error if reply.infrastructure else "",
+            failure=failure,
         )
 
 

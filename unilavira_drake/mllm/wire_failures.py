@@ -164,7 +164,7 @@ def words_of(value: Any) -> str:
 
 def words_of_body(body: bytes) -> str:
     """Returns what a body without JSON says, its tags left out."""
-    text = body[: 64 * MESSAGE_LIMIT].decode("utf-8", "replace")
+    text = body[: 16 * MESSAGE_LIMIT].decode("utf-8", "replace")
     text = re.sub(r"(?is)<(script|style)\b.*?</\1\s*>", " ", text)
     return words_of(re.sub(r"<[^<>]*>", " ", text))
 

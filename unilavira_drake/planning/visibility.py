@@ -8,27 +8,25 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from unilavira_drake.kernels import frozen_view, kernel
 from unilavira_drake.messages import Message
 from unilavira_drake.planning import (
     visibility_any_angle,
     visibility_graph,
     visibility_lines,
+    visibility_path,
     visibility_snapping,
     visibility_space,
     visibility_window,
 )
 from unilavira_drake.planning.visibility_any_angle import FOUND, TOO_LARGE, any_angle_path
-from unilavira_drake.planning.visibility_graph import visibility_path
+from unilavira_drake.planning.visibility_graph import corner_path
 from unilavira_drake.planning.visibility_lines import (
     Slopes,
-    edge,
     path_cost,
-    sees,
-    shorten,
     slopes_of,
     unfold,
 )
+from unilavira_drake.planning.visibility_path import shorten
 from unilavira_drake.planning.visibility_snapping import snap_goal, way_out
 from unilavira_drake.planning.visibility_space import Clearance, FlightSpace
 from unilavira_drake.planning.visibility_window import FlightWindow, make_window, reachable
@@ -39,6 +37,9 @@ UNREACHABLE = "unreachable"
 NO_WAY_OUT = "no free space around the aircraft"
 TOO_MANY = "too many voxels to search"
 
+FARTHEST = 1e6
+"""Places farther than this from the world's origin along an axis are not believed, metres."""
+
 NEAR = 80
 """To goals nearer than this the any-angle path is not compared with corners, voxels."""
 
@@ -47,6 +48,11 @@ SIZES = (2**11, 2**13, 2**16, 2**20)
 
 ROUNDS = 10
 """Most rounds of shortening."""
+
+
+def believable(p_WP: Point) -> bool:
+    """Returns whether a point lies where flights take place; NaN and inf do not."""
+    return all(abs(value) <= FARTHEST for value in p_WP)
 
 
 @dataclass(frozen=True)
@@ -117,13 +123,13 @@ def make_flight_plan(
         goal: the goal snapped before; kept while it is free and there is a way.
         parameters: size and limits.
     """
-    if not np.isfinite([*position, *target, *viewpoint]).all():
-        return FlightPlan(reason="a position is not finite")
+    if not all(map(believable, (position, target, viewpoint))):
+        return FlightPlan(reason=f"a position is not finite, or beyond {FARTHEST:g} m")
     if math.dist(position, target) > parameters.max_distance:
         return FlightPlan(reason=f"farther than {parameters.max_distance:g} m")
     voxels = math.dist(position, target) / space.voxels.resolution
     reason = ""
-    for margin in (max(24, int(0.4 * voxels)), max(200, int(1.5 * voxels))):
+    for margin in (max(20, int(0.3 * voxels)), max(200, int(1.5 * voxels))):
         window = _window(space, (position, target), margin, parameters)
         if window is None:
             return FlightPlan(reason=reason or TOO_MANY)
@@ -166,19 +172,22 @@ def _plan_in(
         end = end_in(window)
     if end is None:
         return FlightPlan(reason=f"no free space within {parameters.snap_distance:g} m")
-    nodes = route(window, start, end, parameters.slopes)
+    slopes = parameters.slopes
+    nodes = route(window, start, end, slopes)
     if not len(nodes):
         within_reach = reachable(window, start)
         found = None if not within_reach.is_blocked(end) else end_in(within_reach)
         if found is not None:
-            nodes = route(window, start, found, parameters.slopes)
+            nodes = route(window, start, found, slopes)
         if not len(nodes):
             failed = not within_reach.is_blocked(end) or found is not None
             return FlightPlan(reason=TOO_MANY if failed else UNREACHABLE)
-    p_WP = window.world(unfold(window.words, nodes, parameters.slopes))
-    if math.dist(p_WP[0], position) > 1e-9:
+    p_WP = window.world(unfold(window.words, nodes, slopes))
+    length = path_cost(nodes, slopes) * window.resolution
+    out = math.dist(p_WP[0], position)
+    if out > 1e-9:
         p_WP = np.concatenate((np.array([position]), p_WP))
-    return FlightPlan(p_WP, float(np.linalg.norm(np.diff(p_WP, axis=0), axis=1).sum()))
+    return FlightPlan(p_WP, length + out)
 
 
 def route(
@@ -193,8 +202,6 @@ def route(
     :func:`unfold`.
     """
     words = window.words
-    if edge(words, start, goal, slopes) >= 0:
-        return np.stack((start, goal))
     for size in SIZES:
         # Before anything costly: is there a way at all?
         if size == SIZES[-1] and reachable(window, start).is_blocked(goal):
@@ -204,9 +211,11 @@ def route(
             break
     if outcome != FOUND:
         return np.zeros((0, 3))
+    if len(nodes) == 2:
+        return nodes
     nodes = shorten(words, nodes, slopes, ROUNDS)
     if path_cost(nodes, slopes) > NEAR:
-        nodes = shorten(words, visibility_path(words, nodes, slopes), slopes, ROUNDS)
+        nodes = shorten(words, corner_path(words, nodes, slopes), slopes, ROUNDS)
     return nodes
 
 
@@ -222,77 +231,23 @@ def _window(
 ) -> FlightWindow | None:
     """Returns the window around some points, or None if it would be too large."""
     resolution = space.voxels.resolution
-    cells = np.floor(np.array(points) / resolution).astype(np.int64)
+    cells = [[math.floor(value / resolution) for value in point] for point in points]
+    (x0, x1), (y0, y1), (z0, z1) = (
+        (min(values), max(values) + 1) for values in zip(*cells, strict=True)
+    )
     floor = math.ceil(parameters.min_altitude / resolution - 1e-9)
     ceiling = math.floor(parameters.max_altitude / resolution + 1e-9)
-    lowest, highest = cells.min(axis=0), cells.max(axis=0) + 1
-    x0, y0, z0 = (int(value) for value in lowest - margin)
-    x1, y1, z1 = (int(value) for value in highest + margin)
     try:
         return make_window(
             space.blocked,
-            low=(x0, y0, max(z0, min(floor, int(lowest[2])))),
-            high=(x1, y1, min(z1, max(ceiling, int(highest[2])))),
+            low=(x0 - margin, y0 - margin, max(z0 - margin, min(floor, z0))),
+            high=(x1 + margin, y1 + margin, min(z1 + margin, max(ceiling, z1))),
             resolution=resolution,
             floor=floor,
             ceiling=ceiling,
         )
     except ValueError:
         return None
-
-
-def path_is_blocked(space: FlightSpace, p_WP: NDArray[np.float64], *, position: Point) -> bool:
-    """Returns whether the rest of a path leads through blocked voxels; (k, 3) metres.
-
-    An aircraft that is in a blocked voxel itself is on its way out: that is no news.
-    """
-    _, ahead = remaining_way(p_WP, position)
-    rest = np.concatenate((np.array([position]), p_WP[ahead:]))
-    cells = np.floor(rest / space.voxels.resolution).astype(np.int64)
-    low, high = cells.min(axis=0) - 1, cells.max(axis=0) + 2
-    window = make_window(
-        space.blocked,
-        low=(int(low[0]), int(low[1]), int(low[2])),
-        high=(int(high[0]), int(high[1]), int(high[2])),
-        resolution=space.voxels.resolution,
-    )
-    points = np.stack([window.point((x, y, z)) for x, y, z in rest])
-    return bool(_touches(window.words, points, 1 if window.is_blocked(points[0]) else 0))
-
-
-@kernel
-def _touches(words: NDArray[np.uint32], points: NDArray[np.float64], first: int) -> bool:
-    for k in range(first, len(points) - 1):
-        a, b = points[k], points[k + 1]
-        if not sees(words, a[0], a[1], a[2], b[0], b[1], b[2]):
-            return True
-    return False
-
-
-def remaining_way(p_WP: NDArray[np.float64], position: Point) -> tuple[float, int]:
-    """Returns the way to the end of a (k, 3) polyline, entered at its nearest point, metres.
-
-    Also the index of the first point that still lies ahead.
-    """
-    if len(p_WP) < 2:
-        return (math.dist(p_WP[-1], position), 0) if len(p_WP) else (0.0, 0)
-    remaining, ahead = _remaining(frozen_view(p_WP, np.float64), np.array(position))
-    return float(remaining), int(ahead)
-
-
-@kernel
-def _remaining(points: NDArray[np.float64], p: NDArray[np.float64]) -> tuple[float, int]:
-    best, remaining, beyond, index = np.inf, 0.0, 0.0, len(points) - 1
-    for k in range(len(points) - 2, -1, -1):
-        step = points[k + 1] - points[k]
-        squared = np.sum(step * step)
-        t = min(max(np.sum((p - points[k]) * step) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
-        off = math.sqrt(np.sum((points[k] + t * step - p) ** 2))
-        if off < best:
-            best, index = off, k + 1
-            remaining = off + (1.0 - t) * math.sqrt(squared) + beyond
-        beyond += math.sqrt(squared)
-    return remaining, index
 
 
 def warm_up() -> None:
@@ -304,8 +259,6 @@ def warm_up() -> None:
         visibility_any_angle,
         visibility_graph,
         visibility_snapping,
+        visibility_path,
     ):
         module.warm_up()
-    points = np.array([[1.5, 1.5, 1.5], [2.5, 1.5, 1.5]])
-    remaining_way(points, (1.0, 1.0, 1.0))
-    _touches(np.zeros((4, 4, 1), np.uint32), points, 0)

@@ -217,6 +217,10 @@ def _search(
     slopes: Slopes,
     capacity: int,
 ) -> tuple[int, NDArray[np.float64]]:
+    if edge(words, start, goal, slopes) >= 0:
+        both = np.empty((2, 3))
+        both[0], both[1] = start, goal
+        return FOUND, both
     ny, nz = words.shape[1], 32 * words.shape[2]
     nodes = Nodes(
         np.empty((capacity, 3)),
@@ -245,7 +249,7 @@ def _search(
         if node > 0 and not _settle(words, nodes, node, near, slopes):
             continue
         nodes.closed[node] = True
-        if cell == last or edge(words, nodes.points[node], goal, slopes) >= 0:
+        if cell == last or (node > 0 and edge(words, nodes.points[node], goal, slopes) >= 0):
             return FOUND, _traced(nodes.points, nodes.parents, node, goal)
         if counts[0] + 27 > capacity or counts[1] + 27 > 4 * capacity:
             return TOO_LARGE, nodes.points[:0]

@@ -24,7 +24,7 @@ _FINEST = 4
 """Side of the smallest block of voxels that keeps only its best corner."""
 
 
-def visibility_path(
+def corner_path(
     words: NDArray[np.uint32],
     known: NDArray[np.float64],
     slopes: Slopes,
@@ -211,4 +211,4 @@ def warm_up() -> None:
     """Compiles the kernels, or loads them from numba's cache."""
     words = np.full((4, 4, 1), 0xFFFFFFF9, np.uint32)
     points = np.array([[1.5, 1.5, 1.5], [2.5, 1.5, 1.5]])
-    visibility_path(words, points, np.array([1.0, 0.0, 1.0, 0.0]))
+    corner_path(words, points, np.array([1.0, 0.0, 1.0, 0.0]))

@@ -192,7 +192,10 @@ def _switchbacks_are_free(
     x, y, z = a[0], a[1], a[2]
     for i in range(1, legs + 1):
         px, py, pz = turning_point(a, b, width, legs, side, i)
-        if not inside(words, px, py, pz) or not sees(words, x, y, z, px, py, pz):
+        # A point on a border counts to the voxel in which the next leg begins.
+        if not inside(words, px, py, pz) or bit(words, int(px), int(py), int(pz)):
+            return False
+        if not sees(words, x, y, z, px, py, pz):
             return False
         x, y, z = px, py, pz
     return True
@@ -226,71 +229,12 @@ def unfold(
     return points
 
 
-@kernel
-def shorten(
-    words: NDArray[np.uint32], nodes: NDArray[np.float64], slopes: Slopes, rounds: int
-) -> NDArray[np.float64]:
-    """Returns a path no longer than the given one: nodes are left out, and moved to their best.
-
-    A node is tried at the voxels 1, 2, 4 and 8 steps away in every direction of the grid.
-    """
-    points = nodes.copy()
-    n = len(points)
-    trial = np.empty(3)
-    for _ in range(rounds):
-        before = n
-        k = 1
-        changed = False
-        while k < n - 1:
-            a, b, c = points[k - 1], points[k], points[k + 1]
-            now = edge_cost(a, b, slopes) + edge_cost(b, c, slopes)
-            if edge_cost(a, c, slopes) <= now and edge(words, a, c, slopes) >= 0:
-                points[k : n - 1] = points[k + 1 : n].copy()
-                n -= 1
-                continue
-            changed = _moved(words, a, b, c, slopes, now, trial) or changed
-            k += 1
-        if n == before and not changed:
-            break
-    return points[:n]
-
-
-@kernel
-def _moved(
-    words: NDArray[np.uint32],
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    c: NDArray[np.float64],
-    slopes: Slopes,
-    now: float,
-    trial: NDArray[np.float64],
-) -> bool:
-    """Moves b to the first better place found; returns whether there was one."""
-    reach = 8
-    while reach > 0:
-        for direction in range(27):
-            trial[0] = b[0] + reach * (direction // 9 - 1)
-            trial[1] = b[1] + reach * (direction // 3 % 3 - 1)
-            trial[2] = b[2] + reach * (direction % 3 - 1)
-            if not inside(words, trial[0], trial[1], trial[2]):
-                continue
-            if edge_cost(a, trial, slopes) + edge_cost(trial, c, slopes) >= now - 1e-6:
-                continue
-            if bit(words, math.floor(trial[0]), math.floor(trial[1]), math.floor(trial[2])):
-                continue
-            if edge(words, a, trial, slopes) >= 0 and edge(words, trial, c, slopes) >= 0:
-                b[:] = trial
-                return True
-        reach //= 2
-    return False
-
-
 def warm_up() -> None:
     """Compiles the kernels, or loads them from numba's cache."""
     words = np.zeros((4, 4, 1), np.uint32)
     nodes = np.array([[1.5, 1.5, 1.5], [2.5, 1.5, 1.5], [2.5, 2.5, 2.5]])
     slopes = slopes_of(math.radians(30.0), math.radians(30.0))
-    unfold(words, shorten(words, nodes, slopes, 1), slopes)
+    unfold(words, nodes, slopes)
     edge(words, nodes[0], nodes[1], slopes)
     sees(words, 1.5, 1.5, 1.5, 2.5, 1.5, 1.5)
     path_cost(nodes, slopes)

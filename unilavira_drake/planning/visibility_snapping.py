@@ -68,10 +68,10 @@ def snap_goal(
         viewpoint: from where the target was seen.
         max_distance: bound on the distance from the target to the goal, metres.
     """
-    there, here = window.point(target), window.point(position)
-    far = math.dist(target, position)
+    there = window.point(target)
     if not window.is_blocked(there):
         return there
+    here, far = window.point(position), math.dist(target, position)
     radius = space.clearance.radius
     apart = BESIDE if far > radius + BESIDE else 0.0
     things = _things_around(space, target, max_distance + SURFACE)

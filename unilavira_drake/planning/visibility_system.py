@@ -15,11 +15,11 @@ from unilavira_drake.planning.visibility import (
     FlightParameters,
     FlightPlan,
     Point,
+    believable,
     make_flight_plan,
-    path_is_blocked,
-    remaining_way,
     warm_up,
 )
+from unilavira_drake.planning.visibility_path import path_is_blocked, remaining_way
 from unilavira_drake.planning.visibility_space import Clearance, FlightSpace, update_space
 from unilavira_drake.ports import Level, message_input, pose_input
 
@@ -228,8 +228,8 @@ class VisibilityPlanner(Level):
         self, state: VisibilityPlannerState, voxels: VoxelMap, position: Point, time: float
     ) -> VisibilityPlannerState:
         n, late = state.status.n, time - state.progress_time > self._stuck_time
-        if not all(map(math.isfinite, position)):
-            return _done(state, n, "failed", "the pose is not finite", None) if late else state
+        if not believable(position):
+            return _done(state, n, "failed", "the pose is lost", None) if late else state
         x, y, z = (float(value) for value in state.path.p_WP[-1])
         if math.dist(position, (x, y, z)) <= self._tolerance:
             heading = _arrival(state.path) if state.heading is None else state.heading

@@ -31,8 +31,8 @@ class FlightWindow(Message):
 
     def point(self, p_WP: tuple[float, float, float]) -> NDArray[np.float64]:
         """Returns a world point in voxels of the window, (3,) float64."""
-        point: NDArray[np.float64] = np.array(p_WP) / self.resolution - np.array(self.low)
-        return point
+        r, (x, y, z), (i, j, k) = self.resolution, p_WP, self.low
+        return np.array((x / r - i, y / r - j, z / r - k))
 
     def world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Returns points of the window, (..., 3), in the world, metres."""
@@ -42,14 +42,14 @@ class FlightWindow(Message):
     def contains(self, point: NDArray[np.float64]) -> bool:
         """Returns whether a point lies within the window and off its blocked border."""
         nx, ny, nw = self.words.shape
-        x, y, z = point
+        x, y, z = point.tolist()
         return bool(1 <= x < nx - 1 and 1 <= y < ny - 1 and 1 <= z < TILE * nw - 1)
 
     def is_blocked(self, point: NDArray[np.float64]) -> bool:
         """Returns whether the voxel of a point is blocked; points outside are."""
         if not self.contains(point):
             return True
-        x, y, z = (math.floor(value) for value in point)
+        x, y, z = map(math.floor, point.tolist())
         return bool(int(self.words[x, y, z >> 5]) >> (z & 31) & 1)
 
 
@@ -105,24 +105,28 @@ def _assemble(
     outside: NDArray[np.uint32],
     words: NDArray[np.uint32],
 ) -> None:
-    """Fills the words of a window from the tiles."""
+    """Fills the words of a window from the tiles, one tile after the other."""
     nx, ny, nw = words.shape
-    for x in range(nx):
-        a = ((x + corner[0]) >> 5) - first[0]
-        i = (x + corner[0]) & 31
-        for y in range(ny):
-            b = ((y + corner[1]) >> 5) - first[1]
-            j = (y + corner[1]) & 31
-            border = x == 0 or x == nx - 1 or y == 0 or y == ny - 1
-            here = 0 <= a < directory.shape[0] and 0 <= b < directory.shape[1]
+    x = 0
+    while x < nx:
+        a, i = ((x + corner[0]) >> 5) - first[0], (x + corner[0]) & 31
+        deep = min(TILE - i, nx - x)
+        y = 0
+        while y < ny:
+            b, j = ((y + corner[1]) >> 5) - first[1], (y + corner[1]) & 31
+            wide = min(TILE - j, ny - y)
             for w in range(nw):
                 c = w + (corner[2] >> 5) - first[2]
-                word = outside[w]
-                if border:
-                    word = _ALL
-                elif here and 0 <= c < directory.shape[2]:
-                    word |= pool[directory[a, b, c], i, j]
-                words[x, y, w] = word
+                known = 0 <= a < directory.shape[0] and 0 <= b < directory.shape[1]
+                known = known and 0 <= c < directory.shape[2]
+                tile = directory[a, b, c] if known else 0
+                for k in range(deep):
+                    for m in range(wide):
+                        words[x + k, y + m, w] = pool[tile, i + k, j + m] | outside[w]
+            y += wide
+        x += deep
+    words[0], words[nx - 1] = _ALL, _ALL
+    words[:, 0], words[:, ny - 1] = _ALL, _ALL
 
 
 def reachable(window: FlightWindow, point: NDArray[np.float64]) -> FlightWindow:

@@ -6,6 +6,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from unilavira_drake.messages import (
     Goal,
+    Grounding,
     LanguageAction,
     NavigationStatus,
     OccupancyMap,
@@ -35,6 +36,9 @@ PORTS = {
 }
 """Input port -> the system and event that a transcript names, and the port's type."""
 
+GROUNDER_PORTS = {"grounding": ("grounder", "grounding", Grounding())}
+"""The same for what only an agent with an auxiliary grounder says."""
+
 
 class Recorder(LeafSystem):
     """Hands what stands on its ports to a listener, between two ticks of the ring.
@@ -57,18 +61,21 @@ class Recorder(LeafSystem):
         - goal
         - navigation_status
         - metrics
+        - grounding (only for an agent with a grounder)
 
     Args:
         listener: called with (simulated seconds, system, event, message).
         period: the tick of the ring, seconds; the ports are read half a tick after it.
+        grounder: whether the agent has an auxiliary grounder.
     """
 
-    def __init__(self, listener: Listener, *, period: float) -> None:
+    def __init__(self, listener: Listener, *, period: float, grounder: bool = False) -> None:
         super().__init__()
         self._listener = listener
+        ports = PORTS | GROUNDER_PORTS if grounder else PORTS
         self._readers = tuple(
             (system, event, message_input(self, port, default))
-            for port, (system, event, default) in PORTS.items()
+            for port, (system, event, default) in ports.items()
         )
         self.DeclarePeriodicPublishEvent(period, period / 2, self._publish)
 

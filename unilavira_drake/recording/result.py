@@ -24,6 +24,8 @@ class TaskResult:
     text: str = ""
     name: str = ""
     goal: str = ""
+    protocol: str = ""
+    """How its stop was judged, see ``tasks.SuccessRule``."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,9 @@ class MetricsResult:
     max_contact_force_n: float = 0.0
     answer: str | None = None
     answer_correct: bool | None = None
+    """By exact match with an accepted answer."""
+    answer_score: float | None = None
+    """A judge's mark of 1 to 5 as (mark - 1) / 4; None without a judge or without its reply."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +118,7 @@ class EpisodeResult:
     cause: str = ""
     """Why the episode ended; a key of ``messages.metrics.CAUSES``."""
     error: str = ""
-    """With the cause ``model_unreachable``: the named error."""
+    """With the cause ``model_unreachable``: the named error; else why the judge gave no mark."""
     task: TaskResult = TaskResult()
     scenario: str = ""
     robot: str = ""

@@ -13,7 +13,7 @@ from unilavira_drake.recording.floor_plan import FloorPlan, Outline, floor_plan
 from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.scenario_loading import load_scenario
-from unilavira_drake.task_choice import choose_task
+from unilavira_drake.task_choice import EpisodeTask, choose_task
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.world import World
 
@@ -58,22 +58,22 @@ def read_setting(folder: Path, result: EpisodeResult | None) -> Setting:
     except (UniLaviraError, OSError) as error:
         told = f"Maps are without rooms and furniture: {error}"
         return Setting(models=models, problems=(told,))
-    goals, area, problems = _goal(task.goal, world, scenario.robot.radius)
+    goals, area, problems = _goal(task, world, scenario.robot.radius)
     return Setting(
         floor_plan(world), goals, area, task.goal, task.spec.text, models, problems=problems
     )
 
 
 def _goal(
-    text: str, world: World, radius: float
+    task: EpisodeTask, world: World, radius: float
 ) -> tuple[tuple[tuple[float, float], ...], tuple[Outline, ...], tuple[str, ...]]:
-    if not text:
+    if not task.goal:
         return (), (), ()
     try:
-        goal = make_goal_field(text, world, radius=radius)
+        goal = make_goal_field(task.goal, world, radius=radius)
     except UniLaviraError as error:
         return (), (), (f"The goal is not on the maps: {error}",)
-    return goal.places, success_area(goal), ()
+    return goal.places, success_area(goal, task.rule), ()
 
 
 def _described(scenario: Scenario) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from unilavira_drake.messages import (
 )
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.reply import MllmReply
-from unilavira_drake.mllm.request import ImagePart, MllmRequest, VisionVariables
+from unilavira_drake.mllm.request import VIEW_LABEL, ImagePart, MllmRequest, VisionVariables
 from unilavira_drake.ports import Level, message_input
 from unilavira_drake.tasks import TaskSpec
 from unilavira_drake.vision.reply import parse_vision_reply
@@ -121,7 +121,7 @@ class Vision(Level):
                 height=frame.intrinsics.height,
                 box_space=self._box_space,
             ),
-            images=(ImagePart(f"view {direction}", frame.jpeg, "high"),),
+            images=(ImagePart(f"{VIEW_LABEL}{direction}", frame.jpeg, "high"),),
             evidence=None if self._detector is None else (self._detector(frame),),
         )
         return dataclasses.replace(state, request=request)

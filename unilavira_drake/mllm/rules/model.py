@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 from unilavira_drake.errors import MllmError
@@ -10,7 +9,10 @@ from unilavira_drake.mllm.reply import Completion, Usage
 from unilavira_drake.mllm.request import MllmRequest, VisionVariables
 from unilavira_drake.mllm.rules.check import answer, double_check
 from unilavira_drake.mllm.rules.decide import decide
+from unilavira_drake.mllm.rules.dials import RulesDials
 from unilavira_drake.mllm.rules.lexicon import unused_words
+from unilavira_drake.mllm.rules.mistakes import misdirected, refuse, written
+from unilavira_drake.mllm.rules.perception import perceived
 from unilavira_drake.mllm.rules.plan import clauses_of, items_of
 from unilavira_drake.mllm.rules.situation import Situation, assess
 from unilavira_drake.mllm.rules.vision import ground
@@ -25,6 +27,9 @@ class RulesModel:
     It reads the prompt's variables and the labelled detections of the views.  It sees no poses,
     no identities across views, no map and nothing behind a closed line of sight, and remembers
     only what the TODO list and the history of the request carry.
+
+    Args:
+        dials: how badly it sees, remembers, decides and writes; by default not at all.
     """
 
     name = "rules"
@@ -34,25 +39,33 @@ class RulesModel:
     deadline = 60.0
     description = "rules on the simulator's labels, not a multimodal LLM"
 
+    def __init__(self, dials: RulesDials | None = None) -> None:
+        self.dials = dials or RulesDials()
+        if told := str(self.dials):
+            self.name = f"{self.name} ({told})"
+            self.description = f"{self.description}; made worse by {told}"
+
     def complete(self, request: MllmRequest) -> Completion:
         """Answers a request.
 
         Raises:
             MllmError: if the request carries no evidence or its call is unknown.
+            ReplyRefused: by chance, if the dial ``refused`` says so.
         """
         if request.evidence is None:
             raise MllmError("rules: the request carries no labelled detections to reason on.")
-        if isinstance(request.variables, VisionVariables):
-            reply = ground(request.variables, request.evidence)
-        else:
-            reply = _language_reply(request)
-        return Completion(json.dumps(reply, ensure_ascii=False), Usage(cost_usd=0.0))
+        refuse(request, self.dials)
+        reply = misdirected(_reply(perceived(request, self.dials)), request, self.dials)
+        text = written(reply, request, self.dials)
+        return Completion(text, Usage(cost_usd=0.0), self.dials.latency or None)
 
     def close(self) -> None:
         """Does nothing: there are no connections."""
 
 
-def _language_reply(request: MllmRequest) -> dict[str, Any]:
+def _reply(request: MllmRequest) -> dict[str, Any]:
+    if isinstance(request.variables, VisionVariables):
+        return ground(request.variables, request.evidence or ())
     situation = assess(request)
     if request.call == "plan_todo":
         return _plan(situation)
