@@ -7,9 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydrake.systems.framework import Context
 
 from unilavira_drake import load_scenario, run_episode
 from unilavira_drake.messages import LanguageAction
+from unilavira_drake.mllm.reply import MllmReply
+from unilavira_drake.mllm.request import MllmRequest
+from unilavira_drake.mllm.usage import ModelUsage
+from unilavira_drake.ports import Level, message_input
 
 SILENCE = "language_latency: !ConstantLatency {seconds: 100000}"
 
@@ -17,8 +22,7 @@ SILENCE = "language_latency: !ConstantLatency {seconds: 100000}"
 @pytest.mark.parametrize(
     ("overlay", "cause"),
     [
-        (f"{SILENCE}\nbudgets: {{stall: 20}}", "stalled"),
-        (f"{SILENCE}\nbudgets: {{simulated_time: 12}}", "time_budget"),
+        (f"{SILENCE}\nbudgets: {{simulated_time: 12, stall: 5}}", "time_budget"),
         ("budgets: {decisions: 1}", "decision_budget"),
     ],
 )
@@ -27,6 +31,25 @@ def test_budgets_and_silence_end_with_a_named_cause(overlay: str, cause: str) ->
     assert result.cause == cause
     assert result.success is False
     assert result.metrics.spl == 0.0
+
+
+class DeadLink(Level):
+    """A link that has lost the model's reply."""
+
+    def __init__(self) -> None:
+        super().__init__(MllmReply(), period=0.1)
+        message_input(self, "model_request", MllmRequest())
+        self.declare_output("model_reply", lambda state: state, MllmReply())
+        self.declare_output("usage", lambda state: ModelUsage(), ModelUsage())
+
+    def step(self, context: Context, state: MllmReply) -> MllmReply:
+        return state
+
+
+def test_a_ring_that_stands_still_is_stalled() -> None:
+    scenario = load_scenario("flat", "budgets: {stall: 20}")
+    result = run_episode(scenario, replace={"language_link": DeadLink()})
+    assert (result.cause, result.success) == ("stalled", False)
 
 
 def test_an_interrupt_keeps_what_was_done(tmp_path: Path) -> None:
