@@ -108,11 +108,12 @@ def _no_preflight(monkeypatch: pytest.MonkeyPatch) -> None:
     ("budget", "cause", "calls"),
     [
         ("model_calls: 3", "call_budget", 3),
-        ("model_seconds: 0.000001", "model_time_budget", 1),
+        ("model_seconds: 35", "model_time_budget", 2),
     ],
 )
 def test_the_models_budgets_end_an_episode(budget: str, cause: str, calls: int) -> None:
-    result = run_episode(load_scenario("flat", f"budgets: {{{budget}}}"))
+    overlay = f"{{language_model: 'rules:latency=20', budgets: {{{budget}}}}}"
+    result = run_episode(load_scenario("flat", overlay))
     assert result.cause == cause
     assert result.usage.attempts == calls
     assert result.scored
