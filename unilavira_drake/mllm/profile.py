@@ -70,7 +70,6 @@ class Profile(_Data):
     image_tokens: ImageTokens | None = None
     prices: Prices | None = None
     """None: the cost is not known and is reported as null."""
-    context_tokens: int | None = pydantic.Field(default=None, gt=0)
     language: RoleSettings = RoleSettings()
     vision: RoleSettings = RoleSettings(
         max_output_tokens=1024, attempt_deadline=60.0, deadline=120.0
