@@ -70,7 +70,7 @@ def test_an_interrupt_keeps_what_was_done(
     lines = Path("kept/transcript.jsonl").read_text().splitlines()
     assert "panorama" in {json.loads(line)["event"] for line in lines}
     result = result_from_json(Path("kept/result.json").read_text())
-    assert (result.cause, result.success) == ("interrupted", False)
+    assert (result.cause, result.success) == ("interrupted", None)
 
 
 def test_a_machine_without_a_renderer_is_not_the_user_s_mistake(

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from unilavira_drake.messages.frozen import Message
 
 UNREACHABLE = "model_unreachable"
+INTERRUPTED = "interrupted"
 """The cause with which nothing is scored."""
 CAUSES = {
     "stopped": "The agent ended the episode by its own verified stop.",
@@ -20,7 +21,7 @@ CAUSES = {
     "cost_budget": "The money of the budget is spent.",
     "stalled": "For the stall time nothing was new: no panorama, action, status, motion or reply.",
     UNREACHABLE: "A model could not be reached or gave no reply; nothing is scored.",
-    "interrupted": "A person stopped the run; what was done until then is kept.",
+    INTERRUPTED: "A person stopped the run; what was done is kept, nothing is scored.",
 }
 """Every cause with which an episode ends, and what it means."""
 
@@ -58,7 +59,7 @@ class EpisodeMetrics(Message):
 
     def interrupted(self) -> EpisodeMetrics:
         """Returns these metrics as those of a run that a person stopped."""
-        return dataclasses.replace(self, cause="interrupted")
+        return dataclasses.replace(self, cause=INTERRUPTED)
 
     @property
     def position(self) -> tuple[float, float]:
