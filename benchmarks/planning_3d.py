@@ -196,11 +196,10 @@ def lengths(worlds: list[World]) -> None:
     for world in worlds:
         for a, b in world.corners():
             world.plan(a, b)
-            spent.append(cpu_ms(lambda: world.plan(a, b)))  # noqa: B023
+            spent.append(cpu_ms(functools.partial(world.plan, a, b)))
             ours = world.plan(a, b).length / RESOLUTION
-            found: list[NDArray[np.int64]] = []
-            peer.append(cpu_ms(lambda: found.append(theta_star(world.blocked, a, b))))  # noqa: B023
-            nodes = found[0] + 0.0
+            peer.append(cpu_ms(functools.partial(theta_star, world.blocked, a, b)))
+            nodes = theta_star(world.blocked, a, b) + 0.0
             theta = float(np.linalg.norm(np.diff(nodes, axis=0), axis=1).sum())
             best = min(theta, ours, straightened(world.window, nodes + offset))
             excess.append(ours / best - 1.0)
@@ -268,10 +267,10 @@ def mapping(world: World, count: int) -> None:
             ratios(f"T6.voxels.{stride}.{peer}",
                    f"a 640x480 depth image at stride {stride} / {peer}", target, tasks)  # fmt: skip
     spaces = [FlightSpace(clearance=SIZE)]
-    spent = [
-        cpu_ms(lambda m=m: spaces.append(update_space(spaces[-1], m)))  # type: ignore[misc]
-        for m in maps[1:]
-    ]
+    spent = []
+    for voxels in maps[1:]:
+        spent.append(cpu_ms(functools.partial(update_space, spaces[-1], voxels)))
+        spaces.append(update_space(spaces[-1], voxels))
     row("T6.space", "inflation after a depth image, new places", statistics.median(spent), "ms")
 
 

@@ -266,3 +266,15 @@ def test_rules_behind_a_server_are_checked_without_pictures() -> None:
     checks = checked(RulesModel(), peer="rules", box_space="pixels", prices=None)
     assert failures(checks) == []
     assert "look at no pictures" in checks["pictures"].detail
+
+
+def test_a_server_that_writes_without_end_is_told_from_one_that_is_away() -> None:
+    class Endless(Peer):
+        def complete(self, request: MllmRequest) -> Completion:
+            time.sleep(1.0)
+            return super().complete(request)
+
+    checks = checked(Endless(), language=RoleSettings(attempt_deadline=0.2, deadline=0.2))
+    assert checks["reachable"].state == "ok"
+    assert failures(checks) == ["model"]
+    assert "without end" in checks["model"].remedy

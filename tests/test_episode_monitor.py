@@ -210,6 +210,17 @@ def test_the_budgets_of_the_models_count_both_together(cause):
     assert bench.metrics.cause == cause
 
 
+@pytest.mark.parametrize("budget", ["model_tokens", "model_cost_usd"])
+def test_a_budget_that_nobody_counts_is_not_kept_in_silence(budget):
+    uncounted = ModelUsage(calls=1, asked=1, uncounted=1)
+    for budgets, cause in (({budget: 1000}, "tokens_not_counted"), ({"model_calls": 9}, "")):
+        bench = Bench(**budgets)
+        bench.fix("language_usage", uncounted)
+        for _ in range(3):
+            bench.tick()
+        assert bench.metrics.cause == cause
+
+
 def test_without_a_budget_nothing_is_counted():
     bench = Bench()
     bench.fix("language_usage", LANGUAGE)

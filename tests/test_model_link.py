@@ -171,6 +171,19 @@ def test_a_refusal_is_the_model_s_own_and_is_paid_for() -> None:
     assert bench.usage(bench.simulator) == ModelUsage(1, 1, 2, COST + COST, 1.0, 3.0, asked=1)
 
 
+def test_what_is_known_of_a_cost_counts_beside_what_is_not() -> None:
+    known, unknown = Usage(10, 5, 0, 0.25), Usage(0, 0, 0, None)
+    attempts = (
+        Attempt("m", "MllmTimeout", usage=unknown),
+        Attempt("m", http_status=200, usage=known),
+        Attempt("m", http_status=200, usage=unknown),
+    )
+    reply = MllmReply(1, usage=known + unknown)
+    usage = ModelUsage().after(reply, attempts=attempts, seconds=1.0)
+    assert (usage.spent_usd, usage.total.cost_usd, usage.attempts) == (0.25, None, 3)
+    assert usage.uncounted == 1
+
+
 def test_a_measured_latency_is_what_the_model_says_it_took() -> None:
     bench = Bench(latency=MeasuredLatency())
     simulator = bench.simulator

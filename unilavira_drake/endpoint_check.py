@@ -18,6 +18,8 @@ from unilavira_drake.errors import (
 )
 from unilavira_drake.messages import LanguageAction, Message
 from unilavira_drake.mllm.box_probe import box_fits, box_request
+from unilavira_drake.mllm.http import HttpLimits, shared_client
+from unilavira_drake.mllm.keys import find_key
 from unilavira_drake.mllm.profile import Profile
 from unilavira_drake.mllm.prompt import compose_prompt
 from unilavira_drake.mllm.remote import RemoteModel
@@ -40,6 +42,12 @@ _PLAUSIBLE = (0.5, 2.0)
 _SLOW = 0.5
 """Share of its deadline that so short a call may take."""
 _TASK = "Leave the room by the white door and stop beside the sofa."
+
+
+_WHAT_FOLLOWS = (
+    *("key", "model", "structured output", "text tokens", "pictures", "box convention"),
+    *("latency", "cost"),
+)
 
 
 @dataclass(frozen=True)
@@ -85,6 +93,11 @@ def check_endpoint(profile: Profile) -> Iterator[Check]:
     used is re-asked once, as in an episode.
     """
     profile = profile.model_copy(update={"max_attempts": 1, "outage_patience": 0.0})
+    silence = _silence(profile)
+    if silence:
+        yield Check(FAILED, "reachable", silence, _server_remedy(profile))
+        yield from (Check(what=what) for what in _WHAT_FOLLOWS)
+        return
     plan = _plan(profile)
     yield _reachable(plan, profile)
     yield _key(plan)
@@ -92,7 +105,7 @@ def check_endpoint(profile: Profile) -> Iterator[Check]:
     yield _structured(plan, profile)
     yield _text_tokens(plan, profile)
     if not plan.answered:
-        yield from (Check(what=what) for what in ("pictures", "box convention", "latency", "cost"))
+        yield from (Check(what=what) for what in _WHAT_FOLLOWS[4:])
         return
     calls = [plan]
     if profile.peer == "rules":
@@ -105,6 +118,20 @@ def check_endpoint(profile: Profile) -> Iterator[Check]:
         yield _box(calls[1], profile)
     yield _latency(calls, profile)
     yield _cost(calls, profile)
+
+
+def _silence(profile: Profile) -> str:
+    """Why the server answers nothing at all; empty where it answers, whatever it says."""
+    limits = HttpLimits(profile.connect_timeout, profile.connect_timeout, profile.max_reply_bytes)
+    try:
+        # The key is looked for and not sent: it belongs to no other path than that of the calls.
+        find_key("language", profile.base_url)
+        shared_client().get(profile.base_url, headers={}, limits=limits)
+    except MllmAuthenticationError:
+        return ""  # The call will tell.
+    except MllmError as error:
+        return str(error)
+    return ""
 
 
 def _plan(profile: Profile) -> _Call:
@@ -145,12 +172,15 @@ def _mark(profile: Profile) -> _Call:
 
 
 def _reachable(plan: _Call, profile: Profile) -> Check:
-    if isinstance(plan.error, MllmUnreachable | MllmTimeout):
-        remedy = f"check that the server runs, and base_url ({profile.base_url}) and dialect"
-        return Check(FAILED, "reachable", str(plan.error), remedy)
+    if isinstance(plan.error, MllmUnreachable):
+        return Check(FAILED, "reachable", str(plan.error), _server_remedy(profile))
     if not plan.attempts:
         return Check(what="reachable")
     return Check(OK, "reachable", f"{profile.base_url} answers")
+
+
+def _server_remedy(profile: Profile) -> str:
+    return f"check that the server runs, and base_url ({profile.base_url}) and dialect"
 
 
 def _key(plan: _Call) -> Check:
@@ -163,6 +193,9 @@ def _model(plan: _Call, profile: Profile) -> Check:
     if plan.answered:
         told = next((attempt.detail for attempt in plan.attempts if attempt.status == "ok"), "")
         return Check(OK, "model", told or profile.model)
+    if isinstance(plan.error, MllmTimeout):
+        remedy = "it is slow, or writes without end: raise attempt_deadline, or lower "
+        return Check(FAILED, "model", str(plan.error), f"{remedy}max_output_tokens")
     if isinstance(plan.error, MllmQuotaError):
         return Check(FAILED, "model", str(plan.error), "wait, or raise the quota at the provider")
     if isinstance(plan.error, MllmRequestError):

@@ -27,7 +27,7 @@ from unilavira_drake.evaluation.scoring import (
     shortest_path,
 )
 from unilavira_drake.messages import Frame
-from unilavira_drake.messages.metrics import INTERRUPTED, UNREACHABLE
+from unilavira_drake.messages.metrics import UNSCORED
 from unilavira_drake.mllm.broker import AttemptListener
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.latency import RealTimeLatency
@@ -134,9 +134,9 @@ def _verdict(
     start: tuple[float, float, float],
     tally: Tally,
 ) -> Score:
-    """Scores what the agent did; an outage or a person's interrupt is not the agent's doing."""
+    """Scores what the agent did; what UNSCORED lists is not the agent's doing."""
     metrics = episode.metrics
-    if metrics.cause in (UNREACHABLE, INTERRUPTED):
+    if metrics.cause in UNSCORED:
         return Score(path_length_m=metrics.path_length)
     verdict = score(goal, metrics, start[:2], episode.output("observer", "panorama"), task.rule)
     if not (task.rule.by_answer and task.answers):

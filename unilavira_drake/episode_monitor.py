@@ -18,7 +18,7 @@ from unilavira_drake.messages import (
     NavigationStatus,
     Panorama,
 )
-from unilavira_drake.messages.metrics import UNREACHABLE, EpisodeMetrics
+from unilavira_drake.messages.metrics import UNCOUNTED, UNREACHABLE, EpisodeMetrics
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.ports import InputReader, Level, message_input, pose_input
 from unilavira_drake.scenario import Budgets
@@ -197,6 +197,9 @@ class EpisodeMonitor(Level):
 
 
 def _spent(usage: ModelUsage, budgets: Budgets) -> str:
+    metered = budgets.model_tokens is not None or budgets.model_cost_usd is not None
+    if metered and usage.uncounted:
+        return UNCOUNTED
     for cause, used, limit in (
         ("call_budget", usage.calls, budgets.model_calls),
         ("token_budget", usage.tokens, budgets.model_tokens),

@@ -133,7 +133,7 @@ class ModelLink(Level):
         )
         usage = state.usage.after(
             reply,
-            attempts=len(outcome.attempts) or 1,
+            attempts=outcome.attempts,
             # A model in this process has no latency of its own; how fast this machine is must not
             # reach the Context.
             seconds=outcome.latency or 0.0,

@@ -6,11 +6,12 @@ import datetime
 from pathlib import Path
 from types import TracebackType
 
+from unilavira_drake.errors import ScenarioError
 from unilavira_drake.mllm.backends import make_backend
 from unilavira_drake.mllm.broker import AttemptListener, Broker
 from unilavira_drake.mllm.cassette import CassetteHeader
 from unilavira_drake.mllm.cassette_file import CassetteWriter
-from unilavira_drake.mllm.replay import RecordingModel, answered_by, declared
+from unilavira_drake.mllm.replay import CassetteModel, RecordingModel, answered_by, declared
 from unilavira_drake.mllm.reply import Mllm
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.task_choice import choose_task
@@ -60,6 +61,12 @@ def make_models(scenario: Scenario, *, on_attempt: AttemptListener | None = None
     """
     language = make_backend(scenario.language_model, role="language", place="language_model")
     vision = make_backend(scenario.vision_model, role="vision", place="vision_model")
+    for model in (language, vision):
+        if isinstance(model, CassetteModel) and model.preset != scenario.prompt_preset:
+            raise ScenarioError(
+                f"prompt_preset: {scenario.prompt_preset!r}, but the cassette was recorded with "
+                f"{model.preset!r}; set prompt_preset={model.preset}."
+            )
     if scenario.record:
         cassette = CassetteWriter(
             Path(scenario.record).expanduser(),

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from unilavira_drake.episode import run_episode
+from unilavira_drake.errors import ScenarioError
 from unilavira_drake.mllm.cassette_file import read_header, read_replies
 from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.resources import cassettes_path
@@ -58,3 +59,9 @@ def test_it_is_replayed_to_its_success_twice_with_the_same_bytes(name: str, tmp_
     counts = results[0].counts
     replies = read_replies(cassettes_path() / f"{name}.jsonl")
     assert counts.language_calls + counts.vision_calls == len(replies)
+
+
+def test_another_preset_than_the_recorded_one_is_refused() -> None:
+    overlay = "{language_model: 'cassette:apartment_fridge', prompt_preset: paper}"
+    with pytest.raises(ScenarioError, match="recorded with 'compact'"):
+        run_episode(load_scenario("apartment", overlay))

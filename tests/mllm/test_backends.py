@@ -59,3 +59,10 @@ def test_a_spec_that_cannot_be_used_is_told_with_its_place(spec: str, fragments:
         made(spec)
     for fragment in ("vision_model", *fragments):
         assert fragment in str(error.value)
+
+
+def test_a_cassette_of_the_package_is_named_without_its_folder() -> None:
+    model = make_backend("cassette:apartment_fridge", role="language", place="m")
+    assert model.reasoning == "model"
+    with pytest.raises(ScenarioError, match="did you mean 'apartment_fridge'"):
+        make_backend("cassette:apartment_frige", role="language", place="m")

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -242,3 +243,29 @@ def test_a_file_that_cannot_be_written_is_told_before_a_call(tmp_path: Path) -> 
         recording(tmp_path / "file" / "c.jsonl", Model())
     with pytest.raises(ScenarioError):
         recording(tmp_path, Model(), "record_new")
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"language": {"name": "other"}}, r"language rules.*this is other"),
+        ({"vision": {"perception": "images"}}, r"vision .*\(images\)"),
+        ({"preset": "paper"}, r"preset compact, this is paper"),
+    ],
+)
+def test_a_cassette_is_continued_by_the_models_that_began_it(
+    path: Path, change: dict[str, Any], told: str
+) -> None:
+    recording(path, Model(), "record").complete(request(1))
+    old = header(Model())
+    known = {"language": {"name": "rules"}, "vision": {"perception": "ground_truth"}}
+    begun = {part: getattr(old, part).model_copy(update=update) for part, update in known.items()}
+    new = {
+        part: update if isinstance(update, str) else begun[part].model_copy(update=update)
+        for part, update in change.items()
+    }
+    other = path.with_name("begun.jsonl")
+    writer = CassetteWriter(other, header=old.model_copy(update=begun))
+    RecordingModel(Model(), writer).complete(request(1))
+    with pytest.raises(ScenarioError, match=told):
+        CassetteWriter(other, header=old.model_copy(update={**begun, **new}), mode="record_new")

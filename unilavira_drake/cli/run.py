@@ -14,7 +14,7 @@ from unilavira_drake.cli.progress import Progress
 from unilavira_drake.cli.summary import print_summary
 from unilavira_drake.episode import run_episode
 from unilavira_drake.errors import InfrastructureError, InputError
-from unilavira_drake.messages.metrics import UNREACHABLE
+from unilavira_drake.messages.metrics import CAUSES, UNCOUNTED, UNREACHABLE
 from unilavira_drake.mllm.backends import SPECS, make_backend
 from unilavira_drake.recording.run_folder import fresh_folder
 from unilavira_drake.rendering_check import check_rendering
@@ -112,7 +112,8 @@ def run_watched(scenario: Scenario, out: Path) -> None:
 
     Raises:
         typer.Exit: with 130 after an interrupt.
-        InfrastructureError: if a model could not be reached; what was done is kept.
+        InfrastructureError: if a model could not be reached, or counts no tokens although a budget
+            of them is set; what was done is kept.
     """
     progress = Progress()
     progress.introduce(
@@ -128,6 +129,10 @@ def run_watched(scenario: Scenario, out: Path) -> None:
     print_summary(result, out, progress.console)
     if result.cause == UNREACHABLE:
         raise InfrastructureError(result.error)
+    if result.cause == UNCOUNTED:
+        raise InfrastructureError(
+            f"{CAUSES[UNCOUNTED]} Set budgets.model_calls or model_seconds instead."
+        )
     if result.cause == "interrupted":
         raise typer.Exit(INTERRUPTED)
 

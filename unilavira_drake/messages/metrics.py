@@ -10,6 +10,9 @@ from unilavira_drake.messages.frozen import Message
 
 UNREACHABLE = "model_unreachable"
 INTERRUPTED = "interrupted"
+UNCOUNTED = "tokens_not_counted"
+UNSCORED = (UNREACHABLE, INTERRUPTED, UNCOUNTED)
+"""Causes that are not the agent's doing."""
 """The cause with which nothing is scored."""
 CAUSES = {
     "stopped": "The agent ended the episode by its own verified stop.",
@@ -21,6 +24,7 @@ CAUSES = {
     "cost_budget": "The money of the budget is spent.",
     "stalled": "For the stall time nothing was new: no panorama, action, status, motion or reply.",
     UNREACHABLE: "A model could not be reached or gave no reply; nothing is scored.",
+    UNCOUNTED: "A budget of tokens or dollars cannot be kept, the server counts none; not scored.",
     INTERRUPTED: "A person stopped the run; what was done is kept, nothing is scored.",
 }
 """Every cause with which an episode ends, and what it means."""

@@ -56,7 +56,7 @@ def make_backend(spec: str, *, role: str, place: str) -> Mllm:
         try:
             if name == "mailbox":
                 return MailboxModel(path)
-            return CassetteModel(_shipped_cassettes().get(rest, path), role=role)
+            return CassetteModel(path if path.exists() else _shipped(rest, place), role=role)
         except InputError as error:
             raise ScenarioError(f"{place}: {error}") from None
     if name not in _PROGRAMS:
@@ -72,9 +72,16 @@ def make_backend(spec: str, *, role: str, place: str) -> Mllm:
         raise ScenarioError(f"{place}: {error}") from None
 
 
-def _shipped_cassettes() -> dict[str, Path]:
-    """Returns the cassettes that come with the package, by their names."""
-    return {path.stem: path for path in sorted(cassettes_path().glob("*.jsonl"))}
+def _shipped(name: str, place: str) -> Path:
+    """Returns the cassette of this name that comes with the package.
+
+    Raises:
+        ScenarioError: if there is none, and no such file either.
+    """
+    shipped = {path.stem: path for path in sorted(cassettes_path().glob("*.jsonl"))}
+    if name not in shipped:
+        raise ScenarioError(unknown_name("cassette (and no such file)", name, shipped, place))
+    return shipped[name]
 
 
 def profile_of(spec: str, *, place: str) -> Profile | None:

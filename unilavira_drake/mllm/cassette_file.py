@@ -16,6 +16,7 @@ from unilavira_drake.mllm.cassette import (
     VERSION,
     CassetteHeader,
     Key,
+    RecordedModel,
     RecordedReply,
     key_of,
     named,
@@ -60,6 +61,21 @@ class Replies:
         )
 
 
+def _check_continued(path: Path, old: CassetteHeader, new: CassetteHeader) -> None:
+    """One cassette tells of one pair of models and one preset, or it would name the wrong ones."""
+    for what in ("language", "vision", "preset"):
+        recorded, asked = getattr(old, what), getattr(new, what)
+        if recorded != asked:
+            raise ScenarioError(
+                f"record: {str(path)!r} was recorded with {what} {_named(recorded)}, this is "
+                f"{_named(asked)}; go on with the same, or name a new file."
+            )
+
+
+def _named(value: RecordedModel | str) -> str:
+    return value if isinstance(value, str) else f"{value.name} ({value.perception})"
+
+
 class CassetteWriter:
     """Appends replies to a cassette, from any thread; the file is made with the first reply.
 
@@ -87,7 +103,7 @@ class CassetteWriter:
                     f"record: {str(path)!r} exists; name a new file, or set "
                     "record_mode=record_new to add to it."
                 )
-            read_header(path)
+            _check_continued(path, read_header(path), header)
             self.replies = read_replies(path)
         folder = next(parent for parent in path.absolute().parents if parent.exists())
         if not (folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)):

@@ -18,7 +18,7 @@ from unilavira_drake.mllm.prompt import Prompt
 from unilavira_drake.mllm.reply import Usage
 from unilavira_drake.mllm.reply_schema import gemini_schema, request_schema, schema_prompt
 from unilavira_drake.mllm.request import ImagePart, MllmRequest
-from unilavira_drake.mllm.transfer import EXTRA_FIELD, request_to_json
+from unilavira_drake.mllm.transfer import typed_member
 from unilavira_drake.mllm.wire import WireFailure, WireReply
 from unilavira_drake.mllm.wire_failures import (
     as_json_text,
@@ -115,10 +115,7 @@ class GeminiDialect:
             *listed(map(_part, parts)),
             b"]}]",
         ]
-        if profile.peer == "rules":
-            typed = json_bytes({EXTRA_FIELD: request_to_json(request, prompt)})
-            pieces += [b",", typed[1:-1]]
-        return b"".join([*pieces, b"}"])
+        return b"".join([*pieces, typed_member(request, prompt, profile), b"}"])
 
     def read(
         self, status: int, headers: Mapping[str, str], data: Any, body: bytes

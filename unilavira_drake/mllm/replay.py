@@ -44,6 +44,11 @@ class CassetteModel:
         self._model: RecordedModel = self._header.model(role)
 
     @property
+    def preset(self) -> str:
+        """The ``prompt_preset`` of the recorded episode."""
+        return self._header.preset
+
+    @property
     def name(self) -> str:
         """The recorded model's, marked as a replay."""
         return f"cassette ({self._model.name})"

@@ -53,6 +53,11 @@ class Attempt(Message):
     detail: str = ""
     """The error in words; holds no key."""
 
+    @property
+    def uncounted(self) -> bool:
+        """Whether a server answered without counting the tokens."""
+        return self.status == "ok" and self.http_status is not None and not self.usage.input_tokens
+
 
 @dataclass(frozen=True)
 class Completion(Message):

@@ -18,6 +18,7 @@ import pydantic
 
 from unilavira_drake.errors import InputError
 from unilavira_drake.mllm.evidence import ViewEvidence
+from unilavira_drake.mllm.profile import Profile
 from unilavira_drake.mllm.prompt import Prompt
 from unilavira_drake.mllm.request import (
     FreeVariables,
@@ -26,6 +27,7 @@ from unilavira_drake.mllm.request import (
     MllmRequest,
     VisionVariables,
 )
+from unilavira_drake.mllm.wire_json import json_bytes
 
 EXTRA_FIELD = "unilavira_request"
 """The member of a body that carries the typed request."""
@@ -34,6 +36,16 @@ _VARIABLES: dict[str, type[LanguageVariables | VisionVariables | FreeVariables]]
     "vision": VisionVariables,
     "free": FreeVariables,
 }
+
+
+def typed_member(request: MllmRequest, prompt: Prompt, profile: Profile) -> bytes:
+    """Returns the member that is added to a body, ``,"unilavira_request":{...}``.
+
+    Empty but for a peer declared as ``rules``: the only place where ground truth is written.
+    """
+    if profile.peer != "rules":
+        return b""
+    return b"," + json_bytes({EXTRA_FIELD: request_to_json(request, prompt)})[1:-1]
 
 
 def request_to_json(request: MllmRequest, prompt: Prompt) -> dict[str, Any]:

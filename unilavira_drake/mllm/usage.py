@@ -31,6 +31,9 @@ class ModelUsage(Message):
     asked: int = 0
     """Requests issued; more than ``calls`` while a model thinks."""
 
+    uncounted: int = 0
+    """Replies of which their server did not count the tokens: no budget of them can be kept."""
+
     def __add__(self, other: ModelUsage) -> ModelUsage:
         return ModelUsage(
             self.calls + other.calls,
@@ -41,6 +44,7 @@ class ModelUsage(Message):
             self.seconds + other.seconds,
             self.failure or other.failure,
             self.asked + other.asked,
+            self.uncounted + other.uncounted,
         )
 
     @property
@@ -54,18 +58,26 @@ class ModelUsage(Message):
         return self.total.input_tokens + self.total.output_tokens
 
     def after(
-        self, reply: MllmReply, *, attempts: int, seconds: float, failure: str = ""
+        self,
+        reply: MllmReply,
+        *,
+        attempts: tuple[Attempt, ...],
+        seconds: float,
+        failure: str = "",
     ) -> ModelUsage:
         """Returns the totals with one more reply, its attempts and the seconds that it took.
 
         ``failure`` is the error in its place in words, if that was not the model's own.
         """
+        costs = [attempt.usage for attempt in attempts] or [reply.usage]
         return self + ModelUsage(
             calls=1,
             errors=int(bool(reply.error)),
-            attempts=attempts,
+            attempts=len(attempts) or 1,
             total=reply.usage,
-            spent_usd=reply.usage.cost_usd or 0.0,
+            # What is known counts, also where another attempt's cost is not.
+            spent_usd=sum(one.cost_usd or 0.0 for one in costs),
+            uncounted=sum(attempt.uncounted for attempt in attempts),
             seconds=seconds,
             failure=failure,
         )

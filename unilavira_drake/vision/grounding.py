@@ -20,6 +20,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,16 +195,16 @@ def _spot(
     box: Box | None, point: tuple[float, float] | None, frame: Frame, limits: GroundingLimits
 ) -> Projection:
     """Returns the place that a box or point means, exactly as the goal selector reads it."""
-    place = {
+    place: dict[str, Any] = {
         "depth": frame.depth,
         "intrinsics": frame.intrinsics,
         "X_WC": frame.X_WC,
         "max_range": limits.max_range,
     }
     if point is not None:
-        return project_point(point, **place)  # type: ignore[arg-type]
+        return project_point(point, **place)
     assert box is not None
-    return project_box(box, **place)  # type: ignore[arg-type]
+    return project_box(box, **place)
 
 
 def _floor_distance(spot: Projection, position: tuple[float, float, float]) -> float:
