@@ -108,7 +108,8 @@ def words(family: str) -> list[str]:
         loader=jinja2.FileSystemLoader(prompts_path()), trim_blocks=True, lstrip_blocks=True
     )
     module: Any = environment.get_template(f"tasks/{family}.txt.j2").module
-    texts = [str(macro()).strip() for macro in (module.task, module.plan, module.ground)]
+    macros = (module.task, module.plan, module.check, module.ground)
+    texts = [str(macro()).strip() for macro in macros]
     return sorted(texts, key=len, reverse=True)
 
 

@@ -10,6 +10,7 @@ from pydrake.systems.framework import Diagram, System
 from unilavira_drake.language.system import Language
 from unilavira_drake.mapping.goal_selector import GoalSelector
 from unilavira_drake.memory.config import MemoryConfig
+from unilavira_drake.memory.revert_system import OneStepRevert
 from unilavira_drake.memory.todo_system import TodoMemory
 from unilavira_drake.memory.waypoint_system import WaypointMemory
 from unilavira_drake.messages import Frame
@@ -58,10 +59,11 @@ def make_agent(
     """Returns the agent; it is the same for every robot.
 
     An ablation is wiring: without TDM ``todo_list`` stays unconnected, without SCB
-    ``second_chance`` does.  The detector reaches a level only when its model declares
-    ``perception: ground_truth``.  Targets beyond ``max_range`` (metres) are refused.
-    ``prompt_preset`` is a key of ``PROMPT_PRESETS``.  ``grounder`` is ``none``, ``color`` or
-    ``label`` (which reads the detector); a ``grounder`` in ``replace`` is wired in any case.
+    ``second_chance`` does; ``lavira``, the predecessor, has no TDM and a ``OneStepRevert``. The
+    detector reaches a level only when its model declares ``perception: ground_truth``. Targets
+    beyond ``max_range`` (metres) are refused. ``prompt_preset`` is a key of ``PROMPT_PRESETS``.
+    ``grounder`` is ``none``, ``color`` or ``label`` (which reads the detector); a ``grounder`` in
+    ``replace`` is wired in any case.
     """
     wiring = Wiring(replace)
     preset = PROMPT_PRESETS[prompt_preset]
@@ -115,6 +117,10 @@ def make_agent(
     wiring.connect("waypoint_memory", "history", "language")
     if ablation in ("full", "no_tdm"):
         wiring.connect("waypoint_memory", "second_chance", "language")
+    if ablation == "lavira":
+        wiring.add("one_step_revert", OneStepRevert)
+        wiring.connect("waypoint_memory", "history", "one_step_revert")
+        wiring.connect("one_step_revert", "second_chance", "language")
     if ablation in ("full", "no_scb"):
         wiring.add("todo_memory", lambda: TodoMemory(period=tick))
         wiring.connect("language", "language_action", "todo_memory")

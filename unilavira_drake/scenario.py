@@ -22,8 +22,9 @@ from unilavira_drake.mllm.latency import (
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.robots.cobot_magic import CobotMagic
 
-# What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both.
-ABLATIONS = ("full", "no_tdm", "no_scb", "no_both")
+# What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both; or both with the
+# predecessor's one-step revert in their place.
+ABLATIONS = ("full", "no_tdm", "no_scb", "no_both", "lavira")
 RENDERERS = ("vtk", "raster")
 GROUNDERS = ("none", "color", "label")
 
@@ -131,7 +132,7 @@ class Scenario:
     # Simulated seconds from a request to its reply.
     language_latency: LatencyChoice = dc.field(default_factory=NoLatency)
     vision_latency: LatencyChoice = dc.field(default_factory=NoLatency)
-    # full | no_tdm | no_scb | no_both.
+    # full | no_tdm | no_scb | no_both | lavira.
     ablation: str = "full"
     # What mends a mark of the vision model that is doubted. none | color (pixels) | label (the
     # simulator's labels: the result then says perception ground_truth).

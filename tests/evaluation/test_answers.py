@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from unilavira_drake.evaluation.answers import chosen, is_correct, score_answer
+from unilavira_drake.answer_words import chosen
+from unilavira_drake.evaluation.answers import is_correct, score_answer
 from unilavira_drake.evaluation.scoring import Score
 
 

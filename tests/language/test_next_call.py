@@ -41,6 +41,12 @@ def test_rows(
     assert next_call(last, outcome, family=family, has_todo=has_todo) == expected
 
 
+def test_a_mere_revert_is_followed_by_an_ordinary_decision() -> None:
+    back = LanguageAction(2, "decide", "backtrack")
+    found = next_call(back, ARRIVED, family="vln", has_todo=False, revert_only=True)
+    assert found == "decide"
+
+
 def test_every_case_is_exactly_one_row() -> None:
     cases = itertools.product(
         (0, 3), CALLS, TOOLS, (None, False, True), (ARRIVED, FAILED), FAMILIES, (False, True)

@@ -322,6 +322,33 @@ def test_evidence_never_enters_the_text() -> None:
     assert compose_prompt(dataclasses.replace(DECIDE, evidence=evidence)) == compose_prompt(DECIDE)
 
 
+def test_a_closed_vocabulary_is_told_with_the_task_and_in_the_answer() -> None:
+    colors = _with(DECIDE, family="eqa", choices=("red", 'blue "sky"'))
+    line = 'The answer is one of: "red", "blue \\"sky\\""'
+    assert line in _text(colors)
+    assert line in _text(dataclasses.replace(colors, call="answer"))
+    assert "exactly one of the answers" in _text(dataclasses.replace(colors, call="answer"))
+    assert "The answer is one of" not in _text(_with(DECIDE, family="eqa"))
+
+
+@pytest.mark.parametrize(
+    ("forgotten", "words"),
+    [((2,), "no room to keep waypoint 2:"), ((2, 3, 4), "no room to keep waypoints 2 to 4:")],
+)
+def test_evicted_waypoints_are_told(forgotten: tuple[int, ...], words: str) -> None:
+    assert words in _text(_with(DECIDE, forgotten=forgotten))
+    assert "no room" not in _text(DECIDE)
+
+
+def test_each_family_says_what_is_checked_before_a_stop() -> None:
+    texts = {
+        family: _text(_with(dataclasses.replace(DECIDE, call="double_check"), family=family))
+        for family in FAMILIES
+    }
+    goals = {text[text.index("Confirm only if") :].split("\n\n")[0] for text in texts.values()}
+    assert len(goals) == len(FAMILIES)
+
+
 def test_a_free_text_is_sent_as_it_is() -> None:
     request = MllmRequest(call="free", variables=FreeVariables("{{ x }}\n"), images=IMAGES[:1])
     assert compose_prompt(request).parts == (IMAGES[0], "{{ x }}\n")

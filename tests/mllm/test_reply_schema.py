@@ -22,6 +22,7 @@ from unilavira_drake.mllm.reply_schema import (
 )
 from unilavira_drake.mllm.request import (
     FreeVariables,
+    ImagePart,
     LanguageVariables,
     MllmRequest,
     VisionVariables,
@@ -173,6 +174,20 @@ def test_without_a_list_there_are_no_words_of_it() -> None:
     schema = request_schema(changed(todo=None))
     assert schema is not None
     assert not {"reasoning_todo", "todo_updates"} & set(schema["properties"])
+
+
+def test_an_answer_keeps_to_its_vocabulary_and_its_pictures() -> None:
+    images = (ImagePart("H3: front view at waypoint 1"), ImagePart("view left"))
+    answer = MllmRequest(
+        call="answer", variables=LanguageVariables(choices=("yes", "no")), images=images
+    )
+    schema = request_schema(answer)
+    assert schema is not None
+    assert schema["properties"]["answer"]["enum"] == ["yes", "no"]
+    assert schema["properties"]["evidence"]["enum"] == ["H3", "left", ""]
+    schema = request_schema(dataclasses.replace(answer, variables=LanguageVariables()))
+    assert schema is not None
+    assert "enum" not in schema["properties"]["answer"]
 
 
 def test_an_empty_list_can_only_grow() -> None:

@@ -47,7 +47,7 @@ def run(
     language_model: Annotated[str | None, _option("The language model.", "SPEC")] = None,
     vision_model: Annotated[str | None, _option("The vision model.", "SPEC")] = None,
     ablation: Annotated[
-        str | None, _option("Memory to leave out.", "full|no_tdm|no_scb|no_both")
+        str | None, _option("Memory to leave out.", "full|no_tdm|no_scb|no_both|lavira")
     ] = None,
     seed: Annotated[str | None, _option("Seed of everything random.", "N")] = None,
     max_decisions: Annotated[str | None, _option("Ends the episode.", "N")] = None,

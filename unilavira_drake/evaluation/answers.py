@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Sequence
 
+from unilavira_drake.answer_words import chosen, folded
 from unilavira_drake.evaluation.scoring import Score
-
-_ARTICLES = frozenset(("a", "an", "the", "it", "is"))
-_NUMBERS = (
-    *("zero", "one", "two", "three", "four", "five", "six"),
-    *("seven", "eight", "nine", "ten", "eleven", "twelve"),
-)
-_SAME = {"grey": "gray", **{word: str(number) for number, word in enumerate(_NUMBERS)}}
 
 
 def is_correct(answer: str, accepted: Sequence[str], choices: Sequence[str] = ()) -> bool:
@@ -27,24 +20,8 @@ def is_correct(answer: str, accepted: Sequence[str], choices: Sequence[str] = ()
         accepted: answers that count.
         choices: a closed vocabulary; what :func:`chosen` finds of it in the answer counts too.
     """
-    right = {_folded(text) for text in accepted} - {""}
-    return _folded(answer) in right or _folded(chosen(answer, choices)) in right
-
-
-def chosen(answer: str, choices: Sequence[str]) -> str:
-    """Returns the one choice that an answer names, empty when it names none or several.
-
-    A choice inside a longer one that is named does not count: of ``room`` and ``dining room``,
-    ``the dining room`` names the latter.
-    """
-    said = f" {_folded(answer)} "
-    found = []
-    for choice in sorted(choices, key=lambda text: -len(_folded(text))):
-        words = f" {_folded(choice)} "
-        if words.strip() and words in said:
-            said = said.replace(words, " | ")
-            found.append(choice)
-    return found[0] if len(found) == 1 else ""
+    right = {folded(text) for text in accepted} - {""}
+    return folded(answer) in right or folded(chosen(answer, choices)) in right
 
 
 def score_answer(
@@ -70,8 +47,3 @@ def score_answer(
     return dataclasses.replace(
         verdict, success=stopped and correct, answer_correct=correct, spl=None
     )
-
-
-def _folded(text: str) -> str:
-    words = re.findall(r"[^\W_]+", text.casefold())
-    return " ".join(_SAME.get(word, word) for word in words if word not in _ARTICLES)

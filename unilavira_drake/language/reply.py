@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from unilavira_drake.answer_words import chosen
 from unilavira_drake.errors import ReplyFormatError
 from unilavira_drake.messages import DIRECTIONS, LanguageAction, TodoUpdate
 from unilavira_drake.mllm.reply_forms import (
@@ -21,7 +22,7 @@ from unilavira_drake.mllm.reply_forms import (
     VerdictReply,
 )
 from unilavira_drake.mllm.reply_model import ReplyModel, bounded, clipped
-from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
+from unilavira_drake.mllm.request import VIEW_LABEL, LanguageVariables, MllmRequest
 from unilavira_drake.tasks import asks
 
 MAX_PLAN_ITEMS = 32
@@ -43,7 +44,8 @@ def parse_language_reply(text: str, request: MllmRequest) -> LanguageAction:
 
     Raises:
         ReplyFormatError: if the text has another form, or names a direction, waypoint, stair or
-            TODO index that the request does not offer.  The sentence can go into a re-ask.
+            TODO index that the request does not offer, or an answer outside a closed vocabulary.
+            The sentence can go into a re-ask.
     """
     variables = request.variables
     if not isinstance(variables, LanguageVariables):
@@ -60,7 +62,7 @@ def _action(
     if isinstance(reply, VerdictReply):
         return _verdict(reply, request, variables)
     if isinstance(reply, AnswerReply):
-        return _answer(reply, request)
+        return _answer(reply, request, variables)
     assert isinstance(reply, ActionReply)
     return _decision(reply, request, variables)
 
@@ -102,17 +104,39 @@ def _verdict(
     )
 
 
-def _answer(reply: AnswerReply, request: MllmRequest) -> LanguageAction:
+def _answer(
+    reply: AnswerReply, request: MllmRequest, variables: LanguageVariables
+) -> LanguageAction:
     answer = bounded(reply.answer, ANSWER_LIMIT, "answer")
     if not answer:
         raise ReplyFormatError("answer is empty; give the likeliest answer.")
+    if variables.choices:
+        choice = chosen(answer, variables.choices)
+        if not choice:
+            raise ReplyFormatError(
+                f"answer {answer!r} names none, or several, of the answers that are possible; give "
+                f"exactly one of: {', '.join(variables.choices)}."
+            )
+        answer = choice
     return LanguageAction(
         n=request.n,
         call=request.call,
         tool="stop",
         progress_analysis=clipped(reply.reasoning, REASONING_LIMIT),
         answer=answer,
+        evidence=_evidence(reply, request),
     )
+
+
+def _evidence(reply: AnswerReply, request: MllmRequest) -> str:
+    """Returns the picture that an answer names; the label of a view is as good as its name."""
+    named = reply.evidence.strip().removeprefix(VIEW_LABEL).removesuffix(" view")
+    if named and named not in request.picture_names:
+        raise ReplyFormatError(
+            f"evidence {reply.evidence!r} names no picture of this prompt; give one of: "
+            f"{', '.join(request.picture_names)}."
+        )
+    return named
 
 
 def _decision(

@@ -124,7 +124,11 @@ class Language(Level):
         task = self._task(context)
         request = language_request(
             call=next_call(
-                state.action, panorama.outcome, family=task.family, has_todo=todo is not None
+                state.action,
+                panorama.outcome,
+                family=task.family,
+                has_todo=todo is not None,
+                revert_only=second_chance is not None and second_chance.revert_only,
             ),
             seed=self._seed,
             task=task,

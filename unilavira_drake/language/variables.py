@@ -82,6 +82,8 @@ def language_request(
         failed_direction="" if second_chance is None else second_chance.failed_direction,
         failed_pictures=tuple(picture.name for picture in failed_frames),
         can_climb=can_climb,
+        choices=task.choices,
+        forgotten=_forgotten(history),
     )
     return MllmRequest(
         role="language",
@@ -131,6 +133,12 @@ def _last_action(action: LanguageAction, history: History) -> str:
     return " ".join(part for part in (action.tool, action.argument) if part)
 
 
+def _forgotten(history: History) -> tuple[int, ...]:
+    """Returns the numbers that have left the buffer; numbers are given in order, from 1 on."""
+    kept = {waypoint.id for waypoint in history.waypoints}
+    return tuple(n for n in range(1, max(kept, default=0)) if n not in kept)
+
+
 def _degrees(angle: float) -> float:
     return round(math.degrees(math.remainder(angle, 2 * math.pi)), 1)
 
@@ -145,6 +153,7 @@ def _waypoint_note(
     dx, dy = waypoint.position[0] - x, waypoint.position[1] - y
     front = _front(waypoint, panorama, history)
     target, scene = waypoint.caption
+    tells_failures = second_chance is not None and not second_chance.revert_only
     return WaypointNote(
         id=waypoint.id,
         distance=round(math.hypot(dx, dy), 2),
@@ -155,8 +164,7 @@ def _waypoint_note(
         tried=tuple(
             _edge_text(edge, front)
             for edge in history.edges
-            if edge.waypoint == waypoint.id
-            and (second_chance is not None or edge.outcome == "arrived")
+            if edge.waypoint == waypoint.id and (tells_failures or edge.outcome == "arrived")
         ),
         offered=second_chance is not None and waypoint.id in second_chance.offers,
         picture=next((p.name for p in history.keyframes if p.number == waypoint.picture), ""),

@@ -146,6 +146,9 @@ class SecondChance(Message):
     failed_frames: tuple[KeyPicture, ...] = ()
     """On arrival after a backtrack: pictures of the failed leg, oldest first; some of them may no
     longer be among the history's key frames."""
+    revert_only: bool = False
+    """Whether a backtrack is a mere revert, as before SCB: nothing that failed is told, and an
+    ordinary decision follows it."""
 
 
 def _clipped(text: str, limit: int) -> str:

@@ -57,7 +57,7 @@ class RandomModel:
             direction = generator.choice(DIRECTIONS)
             action = {"tool": "turn", "direction": direction}
             return _completion(_action(action, "a random direction"))
-        return _completion(_fixed_reply(request.call, self.name))
+        return _completion(_fixed_reply(request, self.name))
 
     def close(self) -> None:
         """Does nothing: there are no connections."""
@@ -88,7 +88,7 @@ class FrontierModel:
             direction = _frontier(variables, _generator(request))
             action = {"tool": "turn", "direction": direction}
             return _completion(_action(action, "free floor not visited yet"))
-        return _completion(_fixed_reply(request.call, self.name))
+        return _completion(_fixed_reply(request, self.name))
 
     def close(self) -> None:
         """Does nothing: there are no connections."""
@@ -121,7 +121,7 @@ class FixedModel:
                 return _completion(_action({"tool": "double_check"}, "the sequence is over"))
             action = {"tool": "turn", "direction": _straight_on(variables)}
             return _completion(_action(action, "ahead, or the freest other way"))
-        return _completion(_fixed_reply(request.call, self.name))
+        return _completion(_fixed_reply(request, self.name))
 
     def close(self) -> None:
         """Does nothing: there are no connections."""
@@ -191,11 +191,14 @@ def _action(action: dict[str, Any], why: str) -> dict[str, Any]:
     }
 
 
-def _fixed_reply(call: str, name: str) -> dict[str, Any]:
+def _fixed_reply(request: MllmRequest, name: str) -> dict[str, Any]:
+    call, variables = request.call, request.variables
     if call == "plan_todo":
         return {"reasoning": f"{name} does not read the task", "todo": ["Move through the place"]}
     if call == "double_check":
         return {"reasoning": f"{name} does not check", "confirmed": True, "reason": ""}
     if call == "answer":
-        return {"reasoning": f"{name} does not read the question", "answer": "unknown"}
+        choices = variables.choices if isinstance(variables, LanguageVariables) else ()
+        first = next(iter(choices), "unknown")
+        return {"reasoning": f"{name} does not read the question", "evidence": "", "answer": first}
     raise MllmError(f"{name}: unknown call {call!r}.")

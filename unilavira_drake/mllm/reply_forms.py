@@ -113,6 +113,8 @@ class AnswerReply(ReplyModel):
     """Reply to ``answer``."""
 
     reasoning: str
+    # The picture that settles it: a view, or a picture of the past by its name.
+    evidence: str = ""
     answer: str
 
 

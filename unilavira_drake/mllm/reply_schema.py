@@ -24,8 +24,8 @@ def request_schema(request: MllmRequest) -> Schema | None:
 
     It holds no references.  Against the form of the call it leaves out what the request does
     not offer: ``go_stair`` for a robot that cannot climb, ``backtrack`` to other waypoints than
-    the offered ones, the direction that has just failed, positions outside of the TODO list, and
-    all TODO fields without a list.
+    the offered ones, the direction that has just failed, positions outside of the TODO list,
+    all TODO fields without a list, and answers outside a closed vocabulary.
     """
     schema = copy.deepcopy(_form(request.call))
     if schema is None:
@@ -35,6 +35,10 @@ def request_schema(request: MllmRequest) -> Schema | None:
     if isinstance(variables, LanguageVariables):
         if request.call == "plan_todo":
             properties["todo"]["minItems"] = 1
+        if request.call == "answer":
+            properties["evidence"]["enum"] = [*request.picture_names, ""]
+            if variables.choices:
+                properties["answer"]["enum"] = list(variables.choices)
         if "action" in properties:
             _narrow_tools(properties["action"], request.call, variables)
             _narrow_todo(schema, variables)

@@ -89,6 +89,10 @@ class LanguageVariables(Message):
     failed_pictures: tuple[str, ...] = ()
     """On ``recover``: names of the pictures of the way that failed, e.g. ``H5``."""
     can_climb: bool = False
+    choices: tuple[str, ...] = ()
+    """The closed vocabulary of a question's answer; empty when any words will do."""
+    forgotten: tuple[int, ...] = ()
+    """Numbers of the waypoints that the buffer had no room for any more."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,7 @@ class MllmRequest(Message):
     """One attempt of one call to one model; (role, n, attempt) names it within an episode."""
 
     role: str = "language"
-    """``language`` | ``vision``."""
+    """``language`` | ``vision``; ``judge`` for the judge of an answer, no part of the agent."""
     n: int = 0
     attempt: int = 0
     seed: int = 0
@@ -147,6 +151,12 @@ class MllmRequest(Message):
     """Only for a model that declares ``perception: ground_truth``."""
     feedback: str = ""
     """On a re-ask: what was wrong with the reply to the previous attempt."""
+
+    @property
+    def picture_names(self) -> tuple[str, ...]:
+        """How a reply names its pictures: ``front`` and the other views, ``H3`` of the past."""
+        labels = (image.label.removeprefix(VIEW_LABEL) for image in self.images)
+        return tuple(label.partition(":")[0] for label in labels)
 
     @functools.cached_property
     def digest(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from unilavira_drake.answer_words import chosen
 from unilavira_drake.mllm.rules.clauses import Clause, describe
 from unilavira_drake.mllm.rules.lexicon import tokenize
 from unilavira_drake.mllm.rules.progress import review
@@ -38,24 +39,38 @@ def double_check(situation: Situation) -> dict[str, Any]:
 
 
 def answer(situation: Situation) -> dict[str, Any]:
-    """Returns the answer to the task's question: a colour, a room, a count, yes, or ``unknown``."""
+    """Returns the answer to the task's question: a colour, a room, a count, yes, or ``unknown``.
+
+    Of a closed vocabulary that has none of these, it gives the first word.
+    """
+    reply = _answer(situation)
+    choices = situation.variables.choices
+    if choices and not chosen(reply["answer"], choices):
+        reply["answer"] = choices[0]
+    return reply
+
+
+def _answer(situation: Situation) -> dict[str, Any]:
     question = situation.variables.task.lower()
     asked = [s.clause for s in situation.steps if s.clause.category]
     thing = asked[-1] if asked else _asked_thing(question)
     seen = situation.scene.matching(thing) if thing else []
     if not seen:
-        return {"reasoning": "the thing asked about is not in view", "answer": UNKNOWN}
+        reason = "the thing asked about is not in view"
+        return {"reasoning": reason, "evidence": "", "answer": UNKNOWN}
     shown = f"{seen[0].name} at {seen[0].near:.1f} m ({seen[0].id})"
+    view, found = seen[0].direction, UNKNOWN
     if re.search(r"\bcolou?r\b", question):
-        return {"reasoning": shown, "answer": seen[0].color or UNKNOWN}
-    if re.search(r"\bhow many\b", question):
-        number = max(sum(s.direction == d for s in seen) for d in {s.direction for s in seen})
-        return {"reasoning": f"most in one view; {shown}", "answer": str(number)}
-    if re.search(r"\b(where|room)\b", question):
-        return {"reasoning": shown, "answer": situation.scene.room or UNKNOWN}
-    if re.match(r"(is|are|do|does|can)\b", question):
-        return {"reasoning": shown, "answer": "yes"}
-    return {"reasoning": shown, "answer": UNKNOWN}
+        found = seen[0].color or UNKNOWN
+    elif re.search(r"\bhow many\b", question):
+        views = [s.direction for s in seen]
+        view = max(views, key=views.count)
+        shown, found = f"most in one view; {shown}", str(views.count(view))
+    elif re.search(r"\b(where|room)\b", question):
+        found = situation.scene.room or UNKNOWN
+    elif re.match(r"(is|are|do|does|can)\b", question):
+        found = "yes"
+    return {"reasoning": shown, "evidence": view, "answer": found}
 
 
 def _asked_thing(question: str) -> Clause | None:

@@ -11,6 +11,7 @@ from unilavira_drake.mllm.rules.clauses import Clause, describe
 from unilavira_drake.mllm.rules.lexicon import tokenize
 from unilavira_drake.mllm.rules.memory import Place
 from unilavira_drake.mllm.rules.parser import parse
+from unilavira_drake.tasks import asks
 
 MAX_ITEMS = 30
 LONGEST_ITEM = 200
@@ -32,7 +33,7 @@ def clauses_of(task: str, family: str, room: str) -> tuple[Clause, ...]:
     A question is searched for like an object; what it asks is answered at the end.
     """
     clauses = parse(task)
-    if family == "eqa":
+    if asks(family):
         clauses = _question(task)
     return tuple(
         dataclasses.replace(c, room=room) if c.kind == "leave" and not c.room else c
