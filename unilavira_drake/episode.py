@@ -18,7 +18,7 @@ from unilavira_drake.diagram import make_navigation_diagram
 from unilavira_drake.episode_result import episode_result
 from unilavira_drake.evaluation.answers import score_answer
 from unilavira_drake.evaluation.goal_area import success_area
-from unilavira_drake.evaluation.judge import judge_episode
+from unilavira_drake.evaluation.judge import RequestListener, judge_episode
 from unilavira_drake.evaluation.scoring import (
     GoalField,
     Score,
@@ -65,7 +65,8 @@ def run_episode(
     Args:
         scenario: what to run.
         out: the run folder, new or empty; None keeps nothing.
-        on_event: called with (simulated seconds, system, event, message) once per message.
+        on_event: called with (simulated seconds, system, event, message) once per message, and
+            with the requests to the judge of the answer.
         replace: user's own Systems, see :func:`make_navigation_diagram`.
         detector: see :func:`make_navigation_diagram`.
 
@@ -74,6 +75,8 @@ def run_episode(
 
     Raises:
         InputError: if the scenario, the task or the folder cannot be used.
+        KeyboardInterrupt: if a person does not wait for the judge of the answer; the folder is
+            whole, without a mark.
     """
     task = choose_task(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
@@ -101,21 +104,26 @@ def run_episode(
             ledgers.append(folder.record_attempt)
         episode.simulate()
         verdict = _verdict(task, episode, goal, start, tally)
-        verdict, error = judge_episode(
-            scenario.judge_model,
+        judgement = judge_episode(
+            models.judge,
             verdict,
             task,
             tally.answer,
             seed=scenario.random_seed,
-            on_attempt=_to_each(ledgers),
+            on_request=_to_event(on_event, episode.metrics.time),
         )
+        if judgement is not None:
+            episode.timings["judge_s"] = round(judgement.usage.seconds, 3)
         result = episode_result(
-            scenario, task, episode.metrics, verdict, tally, models, episode.usage, error
+            scenario, task, episode.metrics, verdict, tally, models, episode.usage, judgement
         )
         if folder is not None:
             folder.write("result.json", result.to_json())
             folder.write("timings.json", json.dumps(episode.timings, indent=2) + "\n")
             folder.write("map.png", _map(world, trace, episode, goal, task))
+    if judgement is not None and judgement.interrupted:
+        # What was done is kept; whoever runs many episodes must not begin the next one.
+        raise KeyboardInterrupt
     return result
 
 
@@ -125,6 +133,13 @@ def _to_each(listeners: Sequence[AttemptListener]) -> AttemptListener:
             listener(request, tries, attempt)
 
     return tell
+
+
+def _to_event(on_event: Listener | None, t: float) -> RequestListener | None:
+    """A person may be the judge: who watches is told, the transcript of the agent is not."""
+    if on_event is None:
+        return None
+    return lambda request: on_event(t, "judge", "model_request", request)
 
 
 def _verdict(
@@ -203,7 +218,7 @@ class _Run:
                     pass
             except KeyboardInterrupt:
                 self._interrupted = True
-        self.timings["models_s"] = round(self.usage.seconds, 3)
+        self.timings["models_s"] = round(sum(one.seconds for one in self.usage.values()), 3)
         self.timings["episode_wall_s"] = round(time.perf_counter() - wall, 3)
         self.timings["episode_cpu_s"] = round(time.process_time() - cpu, 3)
 
@@ -219,13 +234,9 @@ class _Run:
         return metrics.interrupted() if self._interrupted and not metrics.ended else metrics
 
     @property
-    def usage(self) -> ModelUsage:
-        """What both models together have used."""
-        usage: ModelUsage = sum(
-            (self.output("agent", f"{role}_usage") for role in ("language", "vision")),
-            ModelUsage(),
-        )
-        return usage
+    def usage(self) -> dict[str, ModelUsage]:
+        """What each of the two models has used."""
+        return {role: self.output("agent", f"{role}_usage") for role in ("language", "vision")}
 
     def _time(self) -> float:
         return float(self._context().get_time())

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from unilavira_drake.evaluation.judge import Judgement
 from unilavira_drake.evaluation.scoring import Score
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.model_pair import ModelPair
 from unilavira_drake.recording.result import (
     EpisodeResult,
+    JudgeResult,
     MetricsResult,
     ModelResult,
     TaskResult,
@@ -27,18 +31,20 @@ def episode_result(
     verdict: Score,
     tally: Tally,
     models: ModelPair,
-    usage: ModelUsage,
-    judge_error: str = "",
+    usage: Mapping[str, ModelUsage],
+    judgement: Judgement | None = None,
 ) -> EpisodeResult:
     """Returns what ``result.json`` holds.
 
-    ``usage`` is that of both models together, ``judge_error`` why a judge gave no mark.
+    ``usage`` is that of the models by their role; ``judgement`` is that on the answer, None where
+    nobody judged.
     """
+    failures = (one.failure for one in usage.values() if one.failure)
     return EpisodeResult(
         scored=verdict.success is not None,
         success=verdict.success,
         cause=metrics.cause,
-        error=usage.failure or judge_error,
+        error=next(failures, "") or _judge_error(judgement),
         task=TaskResult(task.spec.family, task.spec.text, task.name, task.goal, task.rule.protocol),
         scenario=scenario.name,
         robot=scenario.robot.name,
@@ -58,13 +64,24 @@ def episode_result(
             max_contact_force_n=round(metrics.max_contact_force, 3),
             answer=tally.answer or None,
             answer_correct=verdict.answer_correct,
-            answer_score=verdict.answer_score,
+            answer_score=None if judgement is None else judgement.score,
         ),
         counts=tally.counts(metrics.decisions),
-        usage=UsageResult.of(usage),
+        usage=UsageResult.of(
+            usage["language"], usage["vision"], None if judgement is None else judgement.usage
+        ),
+        judge=None if judgement is None else _judge(judgement),
         time=TimeResult(round(metrics.time, 3)),
         versions=installed_versions(),
     )
+
+
+def _judge(judgement: Judgement) -> JudgeResult:
+    return JudgeResult(judgement.model, judgement.mark, judgement.reasoning)
+
+
+def _judge_error(judgement: Judgement | None) -> str:
+    return f"judge_model: {judgement.error}" if judgement is not None and judgement.error else ""
 
 
 def _model(models: ModelPair, grounder: str) -> ModelResult:

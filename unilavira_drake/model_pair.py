@@ -1,4 +1,4 @@
-"""The two models of an episode, and what keeps their calls."""
+"""The two models of an episode, the judge of its answer, and what keeps their calls."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from unilavira_drake.mllm.backends import make_backend
 from unilavira_drake.mllm.broker import AttemptListener, Broker
 from unilavira_drake.mllm.cassette import CassetteHeader
 from unilavira_drake.mllm.cassette_file import CassetteWriter
+from unilavira_drake.mllm.judges import make_judge
 from unilavira_drake.mllm.replay import CassetteModel, RecordingModel, answered_by, declared
 from unilavira_drake.mllm.reply import Mllm
 from unilavira_drake.scenario import Scenario
@@ -23,11 +24,13 @@ class ModelPair:
     Args:
         language: for the role ``language``.
         vision: for the role ``vision``.
+        judge: for the role ``judge``; asked when the others are closed, and closed by who asks it.
     """
 
-    def __init__(self, language: Broker, vision: Broker) -> None:
+    def __init__(self, language: Broker, vision: Broker, judge: Broker | None = None) -> None:
         self.language = language
         self.vision = vision
+        self.judge = judge
 
     def __enter__(self) -> ModelPair:
         """Returns itself."""
@@ -39,11 +42,11 @@ class ModelPair:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Closes both, also after an error or an interrupt."""
+        """Closes language and vision, also after an error or an interrupt."""
         self.close()
 
     def close(self) -> None:
-        """Gives up the calls under way; replies that have come stay readable."""
+        """Gives up the agent's calls under way; replies that have come stay readable."""
         self.language.close()
         self.vision.close()
 
@@ -61,6 +64,7 @@ def make_models(scenario: Scenario, *, on_attempt: AttemptListener | None = None
     """
     language = make_backend(scenario.language_model, role="language", place="language_model")
     vision = make_backend(scenario.vision_model, role="vision", place="vision_model")
+    judge = make_judge(scenario.judge_model) if scenario.judge_model else None
     for model in (language, vision):
         if isinstance(model, CassetteModel) and model.preset != scenario.prompt_preset:
             raise ScenarioError(
@@ -70,15 +74,20 @@ def make_models(scenario: Scenario, *, on_attempt: AttemptListener | None = None
     if scenario.record:
         cassette = CassetteWriter(
             Path(scenario.record).expanduser(),
-            header=_header(scenario, language, vision),
+            header=_header(scenario, language, vision, judge),
             mode=scenario.record_mode,
         )
         language = RecordingModel(language, cassette)
         vision = RecordingModel(vision, cassette)
-    return ModelPair(Broker(language, on_attempt=on_attempt), Broker(vision, on_attempt=on_attempt))
+        judge = RecordingModel(judge, cassette) if judge is not None else None
+    return ModelPair(
+        Broker(language, on_attempt=on_attempt),
+        Broker(vision, on_attempt=on_attempt),
+        None if judge is None else Broker(judge, on_attempt=on_attempt),
+    )
 
 
-def _header(scenario: Scenario, language: Mllm, vision: Mllm) -> CassetteHeader:
+def _header(scenario: Scenario, language: Mllm, vision: Mllm, judge: Mllm | None) -> CassetteHeader:
     who = dict.fromkeys((answered_by(language), answered_by(vision)))
     return CassetteHeader(
         answered_by=" and ".join(who),
@@ -90,4 +99,5 @@ def _header(scenario: Scenario, language: Mllm, vision: Mllm) -> CassetteHeader:
         seed=scenario.random_seed,
         language=declared(language),
         vision=declared(vision),
+        judge=None if judge is None else declared(judge),
     )

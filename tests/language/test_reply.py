@@ -292,28 +292,31 @@ COLORS = ("red", "light blue", "blue")
     ("answer", "named"), [("It is Red.", "red"), ("light blue", "light blue"), ("BLUE", "blue")]
 )
 def test_an_answer_is_one_of_the_closed_vocabulary(answer: str, named: str) -> None:
-    reply = {"reasoning": "seen", "evidence": "", "answer": answer}
+    reply = {"reasoning": "seen", "evidence": [], "answer": answer}
     assert _parse(reply, "answer", family="eqa", choices=COLORS).answer == named
 
 
 @pytest.mark.parametrize("answer", ["green", "red or blue", "unknown"])
 def test_an_answer_outside_the_closed_vocabulary_is_asked_again(answer: str) -> None:
-    reply = {"reasoning": "seen", "evidence": "", "answer": answer}
+    reply = {"reasoning": "seen", "evidence": [], "answer": answer}
     with pytest.raises(ReplyFormatError, match="exactly one of: red, light blue, blue"):
         _parse(reply, "answer", family="eqa", choices=COLORS)
 
 
 @pytest.mark.parametrize(
     ("evidence", "named"),
-    [("left", "left"), ("left view", "left"), ("view left", "left"), ("H3", "H3"), ("", "")],
+    [(["left"], ("left",)), (["left view", "H3"], ("left", "H3")), (["view left"], ("left",))],
 )
-def test_an_answer_names_the_picture_that_settles_it(evidence: str, named: str) -> None:
+def test_an_answer_names_the_pictures_that_settle_it(
+    evidence: list[str], named: tuple[str, ...]
+) -> None:
     images = (ImagePart("H3: front view at waypoint 1"), ImagePart("view left"))
     request = dataclasses.replace(_request("answer", family="eqa"), images=images)
-    reply = json.dumps({"reasoning": "seen", "evidence": evidence, "answer": "red"})
-    assert parse_language_reply(reply, request).evidence == named
-    with pytest.raises(ReplyFormatError, match=r"names no picture of this prompt; .*H3, left"):
-        parse_language_reply(reply.replace(f'"{evidence}"', '"H9"'), request)
+    reply = {"reasoning": "seen", "evidence": evidence, "answer": "red"}
+    assert parse_language_reply(json.dumps(reply), request).evidence == named
+    for wrong in ("H9", ""):
+        with pytest.raises(ReplyFormatError, match=r"no picture of this prompt; .*H3, left"):
+            parse_language_reply(json.dumps({**reply, "evidence": [wrong]}), request)
 
 
 def test_bad_json_is_the_same_error() -> None:

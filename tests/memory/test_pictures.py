@@ -41,11 +41,32 @@ def test_a_look_differs_by_grey_levels_and_from_nothing_at_all() -> None:
 
 @settings(derandomize=True, deadline=None, max_examples=50)
 @given(st.integers(0, 200), st.integers(0, 40))
-def test_the_window_is_the_latest_and_moves_in_blocks(count: int, keep: int) -> None:
+def test_views_at_waypoints_alone_are_dropped_oldest_first_in_blocks(count: int, keep: int) -> None:
     window = shown(pictures(count), keep)
     assert window == pictures(count)[count - len(window) :]
     assert min(count, keep) <= len(window) <= keep + 3
     assert (count - len(window)) % 4 == 0
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(st.lists(st.booleans(), max_size=60), st.integers(0, 12))
+def test_a_prompt_begins_as_the_one_before_and_keeps_places_longer(
+    on_the_way: list[bool], keep: int
+) -> None:
+    all_of_them = tuple(
+        KeyPicture(number=i + 1, direction="left" if way else "")
+        for i, way in enumerate(on_the_way)
+    )
+    before: tuple[KeyPicture, ...] = ()
+    for count in range(1, len(all_of_them) + 1):
+        window = shown(all_of_them[:count], keep)
+        assert min(count, keep) <= len(window) <= keep + 3
+        gone = [p for p in (*before, all_of_them[count - 1]) if p not in window]
+        assert len(gone) in (0, 4)
+        assert [p for p in (*before, all_of_them[count - 1]) if p in window] == list(window)
+        if any(not p.direction for p in gone):
+            assert not any(p.direction for p in window)
+        before = window
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)

@@ -184,7 +184,7 @@ def test_an_answer_keeps_to_its_vocabulary_and_its_pictures() -> None:
     schema = request_schema(answer)
     assert schema is not None
     assert schema["properties"]["answer"]["enum"] == ["yes", "no"]
-    assert schema["properties"]["evidence"]["enum"] == ["H3", "left", ""]
+    assert schema["properties"]["evidence"]["items"]["enum"] == ["H3", "left"]
     schema = request_schema(dataclasses.replace(answer, variables=LanguageVariables()))
     assert schema is not None
     assert "enum" not in schema["properties"]["answer"]

@@ -112,7 +112,10 @@ def test_arrival_hands_on_the_heading_and_empties_the_path():
     bench = Bench()
     bench.give("goal", go(heading=1.25))
     bench.wait()
-    assert bench.drive(1.0, 60) == NavigationStatus(1, "arrived", "", 1.25)
+    status = bench.drive(1.0, 60)
+    assert dc.replace(status, remaining=None) == NavigationStatus(1, "arrived", "", 1.25)
+    assert status.remaining is not None
+    assert status.remaining < 0.15
     assert math.dist(bench.position, (6.0, 2.0)) <= 0.15 + 0.04
     assert (bench.path.n, len(bench.path.p_WP)) == (1, 0)
     bench.wait(5)
@@ -141,7 +144,7 @@ def test_standing_still_is_stuck_even_while_the_map_changes():
         bench.give("map", room(version=2 + k))
         assert bench.wait().state == "moving"
     assert bench.path.version >= 2
-    assert bench.wait(3) == NavigationStatus(1, "failed", "stuck")
+    assert bench.wait(3) == NavigationStatus(1, "failed", "stuck", remaining=5.0)
     assert not len(bench.path.p_WP)
 
 
@@ -223,7 +226,9 @@ def test_a_cloned_context_has_the_same_future():
     branch.AdvanceTo(20.0)
     bench.simulator.AdvanceTo(20.0)
     other = bench.planner.GetOutputPort("navigation_status").Eval(branch.get_context())
-    assert bench.status == other == NavigationStatus(1, "failed", "stuck")
+    assert bench.status == other
+    assert (other.state, other.reason) == ("failed", "stuck")
+    assert other.remaining == pytest.approx(4.6, abs=0.1)
 
 
 def test_the_next_goal_starts_afresh():

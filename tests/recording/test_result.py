@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import pytest
@@ -9,7 +10,9 @@ from unilavira_drake.mllm.reply import Usage
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.recording.result import (
     EpisodeResult,
+    JudgeResult,
     MetricsResult,
+    RoleUsageResult,
     TaskResult,
     UsageResult,
     installed_versions,
@@ -27,12 +30,23 @@ RESULT = EpisodeResult(
 )
 
 
+LANGUAGE = ModelUsage(3, 1, 5, Usage(900, 90, 12, 0.25, 400, 60), 0.25, 40.0)
+VISION = ModelUsage(2, 0, 2, Usage(100, 10, 2, 0.0), 0.0, 2.0)
+JUDGE = ModelUsage(1, 0, 2, Usage(300, 30, 0, 0.5), 0.5, 3.0)
+JUDGED = dataclasses.replace(
+    RESULT,
+    usage=UsageResult.of(LANGUAGE, VISION, JUDGE),
+    judge=JudgeResult("someone", 4, "Nearly."),
+)
+
+
 def words(text: str) -> set[str]:
     return set(text.split())
 
 
-def test_a_result_survives_its_file() -> None:
-    assert result_from_json(RESULT.to_json()) == RESULT
+@pytest.mark.parametrize("result", [RESULT, JUDGED], ids=["alone", "judged"])
+def test_a_result_survives_its_file(result: EpisodeResult) -> None:
+    assert result_from_json(result.to_json()) == result
 
 
 def test_the_file_holds_the_public_names() -> None:
@@ -50,35 +64,58 @@ def test_the_file_holds_the_public_names() -> None:
     assert set(data["counts"]) == words(
         "decisions language_calls vision_calls reasks fallbacks backtracks"
     )
-    assert set(data["usage"]) == words(
-        "input_tokens output_tokens images cost_usd cached_tokens reasoning_tokens attempts errors"
+    columns = words(
+        "input_tokens output_tokens images cost_usd cached_tokens reasoning_tokens attempts errors "
+        "calls"
     )
+    assert set(data["usage"]) == columns | {"language", "vision", "judge"}
+    assert data["usage"]["judge"] is data["judge"] is data["success"] is None
+    data = json.loads(JUDGED.to_json())
+    assert set(data["usage"]["language"]) == set(data["usage"]["judge"]) == columns
+    assert data["judge"] == {"model": "someone", "mark": 4, "reasoning": "Nearly."}
     assert data["time"] == {"simulated_s": 0.0}
-    assert data["success"] is None
 
 
 @pytest.mark.parametrize(
     "text",
-    ["", "[]", "{}", '{"schema_version": 99}', RESULT.to_json().replace("cause", "causes")],
-)
+    [
+        "", "[]", "{}", '{"schema_version": 99}', RESULT.to_json().replace("cause", "causes"),
+        JUDGED.to_json().replace("mark", "note"), JUDGED.to_json().replace("calls", "questions"),
+    ],
+)  # fmt: skip
 def test_another_file_is_refused(text: str) -> None:
     with pytest.raises(InputError, match=r"result\.json"):
         result_from_json(text)
 
 
-def test_the_usage_is_that_of_both_models() -> None:
-    language = ModelUsage(3, 1, 5, Usage(900, 90, 12, 0.25, 400, 60), 0.25, 40.0)
-    vision = ModelUsage(2, 0, 2, Usage(100, 10, 2, None), 0.0, 2.0)
-    assert UsageResult.of(language + vision) == UsageResult(1000, 100, 14, None, 400, 60, 7, 1)
-    assert (language + vision).spent_usd == 0.25
-    assert UsageResult.of(ModelUsage()) == UsageResult(cost_usd=0.0)
+def test_the_usage_is_that_of_all_models_and_tells_them_apart() -> None:
+    language = RoleUsageResult(900, 90, 12, 0.25, 400, 60, 5, 1, 3)
+    vision = RoleUsageResult(100, 10, 2, 0.0, 0, 0, 2, 0, 2)
+    judge = RoleUsageResult(300, 30, 0, 0.5, 0, 0, 2, 0, 1)
+    alone = UsageResult.of(LANGUAGE, VISION)
+    assert alone == UsageResult(1000, 100, 14, 0.25, 400, 60, 7, 1, 5, language, vision, None)
+    judged = UsageResult.of(LANGUAGE, VISION, JUDGE)
+    assert judged == UsageResult(1300, 130, 14, 0.75, 400, 60, 9, 1, 6, language, vision, judge)
+    nothing = RoleUsageResult(cost_usd=0.0)
+    assert UsageResult.of(ModelUsage(), ModelUsage()) == UsageResult(
+        cost_usd=0.0, language=nothing, vision=nothing
+    )
+
+
+def test_one_price_that_is_not_known_leaves_the_others_known() -> None:
+    unknown = ModelUsage(1, 0, 1, Usage(300, 30, 0, None))
+    usage = UsageResult.of(LANGUAGE, VISION, unknown)
+    assert usage.cost_usd is None
+    assert usage.language is not None
+    assert usage.judge is not None
+    assert (usage.language.cost_usd, usage.judge.cost_usd) == (0.25, None)
 
 
 def test_a_result_of_before_these_fields_is_read() -> None:
     data = json.loads(RESULT.to_json())
-    for name in ("attempts", "errors"):
+    for name in ("attempts", "errors", "calls", "language", "vision", "judge"):
         del data["usage"][name]
-    del data["error"]
+    del data["error"], data["judge"]
     assert result_from_json(json.dumps(data)) == RESULT
 
 

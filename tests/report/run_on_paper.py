@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 
 from unilavira_drake.memory.todo import apply_updates
 from unilavira_drake.messages import (
+    Candidate,
     Frame,
     Goal,
+    Grounding,
     Intrinsics,
     LanguageAction,
     NavigationStatus,
@@ -127,6 +130,20 @@ def done(index: int, result: str) -> TodoUpdate:
     return TodoUpdate("update", index, status="completed", result=result)
 
 
+REFINED, LEFT = (340.0, 150.0, 480.0, 310.0), (520.0, 30.0, 600.0, 90.0)
+"""Boxes of the grounder in step 2: the one that was taken, and one that was not."""
+
+
+def refined(vision: VisionAction) -> Grounding:
+    return Grounding(
+        vision.n,
+        dataclasses.replace(vision, box=REFINED, confidence=0.9),
+        doubt="low confidence",
+        candidates=(Candidate(REFINED, 0.9), Candidate(LEFT, 0.6)),
+        refined=True,
+    )
+
+
 def write_run(path: Path, *, result: bool = True, scenario: bool = True) -> Path:
     """Writes the run folder and returns it; it lacks ``map.png`` and ``timings.json``."""
     with RunFolder(path) as folder:
@@ -173,7 +190,9 @@ def _plan_and_turn(pen: Pen) -> None:
     )
     pen.ground(2, "left", "{}")
     box = (100.0, 120.0, 300.0, 330.0)
-    pen.say("vision", "vision_action", VisionAction(2, "left", box, None, f"door {HOSTILE}", 0.8))
+    vision = VisionAction(2, "left", box, None, f"door {HOSTILE}", 0.3)
+    pen.say("vision", "vision_action", vision)
+    pen.say("grounder", "grounding", refined(vision))
     goal = Goal(2, "go", p_WG=(2.2, 5.0, 0.0), pixel=(200.0, 225.0))
     pen.drive(goal, (2.6, 7.4))
 
@@ -188,7 +207,9 @@ def _fail_twice(pen: Pen) -> None:
     )
     pen.act(LanguageAction(3, "decide", "turn", "front", todo_updates=updates))
     pen.ground(3, "front", "bad", "worse")
-    pen.say("vision", "vision_action", VisionAction(3, "front", reason="no box", fallback=True))
+    vision = VisionAction(3, "front", reason="no box", fallback=True)
+    pen.say("vision", "vision_action", vision)
+    pen.say("grounder", "grounding", Grounding(3, vision))
     pen.drive(Goal(3, "none", reason="no target: no box"), (2.2, 5.0), "no target: no box")
     pen.look(4, 3, 2.2, 5.0, Outcome("failed", "no target: no box"))
     pen.ask(4, "decide", 2, ("?", "??"))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, sync_playwright
-from run_on_paper import COLORS, HOSTILE, write_run
+from run_on_paper import COLORS, HOSTILE, LEFT, REFINED, write_run
 
 from unilavira_drake.cli.main import main
 
@@ -199,6 +199,28 @@ def test_views_and_marks_are_really_drawn(visit: Opener) -> None:
         ((215, 225), cyan),
     ):
         np.testing.assert_allclose(target[round(v * scale), round(u * scale)], color, atol=40)
+
+
+def test_the_refined_mark_is_drawn_beside_the_model_s(visit: Opener) -> None:
+    one = visit("#step=2")
+    magenta = np.array((255, 107, 241))
+
+    def drawn(selector: str, box: tuple[float, float, float, float]) -> float:
+        """The share of a box's upper edge in the color of the grounder."""
+        image = one.image(selector).astype(int)
+        u0, v0, u1, _ = np.array(box) * image.shape[1] / 640
+        edge = image[round(v0) - 1 : round(v0) + 2, round(u0) + 4 : round(u1) - 4]
+        return float((np.abs(edge - magenta).max(axis=2) < 60).any(axis=0).mean())
+
+    target, view = "#step\\=2 .target .picture", "#step\\=2 .view.chosen .picture"
+    # Dashes, and dots for what was not taken; these in the large picture only.
+    assert 0.4 < drawn(target, REFINED) < 0.9
+    assert 0.1 < drawn(target, LEFT) < 0.6
+    assert drawn(view, REFINED) > 0.2
+    assert drawn(view, LEFT) == 0.0
+    keys = one.page.locator("#step\\=2 .target .key")
+    styles = keys.evaluate_all("keys => keys.map(key => getComputedStyle(key).borderTopStyle)")
+    assert styles == ["solid", "dashed", "dotted", "none"]
 
 
 def test_the_list_shows_its_changes(visit: Opener) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import hashlib
 import re
 from html.parser import HTMLParser
@@ -10,6 +11,14 @@ import pytest
 from run_on_paper import HOSTILE, TASK, write_run
 
 from unilavira_drake.cli.main import main
+from unilavira_drake.mllm.reply import Usage
+from unilavira_drake.mllm.usage import ModelUsage
+from unilavira_drake.recording.result import (
+    EpisodeResult,
+    JudgeResult,
+    MetricsResult,
+    UsageResult,
+)
 from unilavira_drake.report.page import render_report
 
 
@@ -107,6 +116,41 @@ def test_the_page_says_what_happened_in_words(page: str) -> None:
         "The agent ends the episode here.",
     ):
         assert words in text, words
+
+
+def test_a_judge_stands_beside_the_exact_match(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", result=False)
+    usage = Usage(300, 30, 0, 0.25)
+    judged = EpisodeResult(
+        success=False,
+        cause="stopped",
+        metrics=MetricsResult(answer="pink", answer_correct=False, answer_score=0.75),
+        judge=JudgeResult("a judge", 4, HOSTILE),
+        usage=UsageResult.of(ModelUsage(), ModelUsage(), ModelUsage(1, 0, 1, usage)),
+    )
+    (folder / "result.json").write_text(judged.to_json())
+    page = render_report(folder)
+    assert HOSTILE not in page
+    text = re.sub(r"(<[^>]+>|\s)+", " ", page)
+    for words in (
+        "answer pink answer correct no answer score 0.75 (4 of 5 by a judge)",
+        "the judge&#39;s reason &lt;script&gt;window.hacked = 1",
+        "tokens 300 in, 30 out; the judge&#39;s part 300 in, 30 out",
+        "cost 0.2500 USD; the judge&#39;s part 0.2500 USD",
+    ):
+        assert words in text, words
+    failed = dataclasses.replace(judged, judge=JudgeResult("a judge"), error="judge_model: down")
+    (folder / "result.json").write_text(failed.to_json())
+    assert "answer score none: judge_model: down" in re.sub(
+        r"(<[^>]+>|\s)+", " ", render_report(folder)
+    )
+
+
+def test_the_scenario_s_judge_is_named(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run")
+    path = folder / "scenario.yaml"
+    path.write_text(path.read_text().replace("judge_model: ''", "judge_model: mailbox:letters"))
+    assert "Judge of answers: a human answers through the folder letters." in render_report(folder)
 
 
 def test_the_same_run_has_the_same_page(folder: Path, page: str) -> None:

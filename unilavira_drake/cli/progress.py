@@ -56,9 +56,11 @@ class Progress:
         if self._status is not None:
             self._status.stop()
 
-    def introduce(self, *, language: Mllm, vision: Mllm, task: EpisodeTask) -> None:
+    def introduce(
+        self, *, language: Mllm, vision: Mllm, task: EpisodeTask, judge: Mllm | None = None
+    ) -> None:
         """Says what the models are, and what the task is."""
-        for role, model in (("language", language), ("vision", vision)):
+        for role, model in (("language", language), ("vision", vision), ("judge", judge)):
             if isinstance(model, MailboxModel):
                 self._mailboxes[role] = model
         if language.description == vision.description:
@@ -66,6 +68,8 @@ class Progress:
         else:
             self._line(f"language model: {language.description}", "bold")
             self._line(f"vision model: {vision.description}", "bold")
+        if judge is not None:
+            self._line(f"judge of answers: {judge.description}", "bold")
         name = f" @{task.name}" if task.name else ""
         scored = f"scored against {task.goal}" if task.goal else "not scored"
         self._line(f"task{name} ({task.spec.family}, {scored}): {task.spec.text}")

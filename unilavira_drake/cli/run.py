@@ -16,6 +16,7 @@ from unilavira_drake.episode import run_episode
 from unilavira_drake.errors import InfrastructureError, InputError
 from unilavira_drake.messages.metrics import CAUSES, UNCOUNTED, UNREACHABLE
 from unilavira_drake.mllm.backends import SPECS, make_backend
+from unilavira_drake.mllm.judges import make_judge
 from unilavira_drake.recording.run_folder import fresh_folder
 from unilavira_drake.rendering_check import check_rendering
 from unilavira_drake.scenario import Scenario
@@ -120,6 +121,7 @@ def run_watched(scenario: Scenario, out: Path) -> None:
         language=make_backend(scenario.language_model, role="language", place="language_model"),
         vision=make_backend(scenario.vision_model, role="vision", place="vision_model"),
         task=choose_task(scenario),
+        judge=make_judge(scenario.judge_model) if scenario.judge_model else None,
     )
     try:
         with progress:

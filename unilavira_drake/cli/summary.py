@@ -7,9 +7,11 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from unilavira_drake.messages.metrics import CAUSES
 from unilavira_drake.recording.result import EpisodeResult
+from unilavira_drake.report.figures import cost_figures, judge_figures
 
 _YES_NO = {True: "yes", False: "no", None: "-"}
 _VERDICTS = {True: "success", False: "no success", None: "not scored"}
@@ -22,7 +24,8 @@ def print_summary(result: EpisodeResult, out: Path, console: Console) -> None:
     console.print(CAUSES.get(result.cause, ""), markup=False)
     table = Table(show_header=False)
     for name, value in _figures(result):
-        table.add_row(name, value)
+        # A model's words are no markup and no commands to a terminal.
+        table.add_row(name, Text("".join(c if c.isprintable() else " " for c in value)))
     console.print(table)
     console.print(f"run folder: {out}", markup=False, soft_wrap=True)
     console.print("next, try:", markup=False)
@@ -68,7 +71,7 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
         rows.append(("answer", metrics.answer))
     if metrics.answer_correct is not None:
         rows.append(("answer correct", _YES_NO[metrics.answer_correct]))
-    return rows
+    return [*rows, *judge_figures(result), *cost_figures(result.usage)]
 
 
 def _metres(value: float | None) -> str:

@@ -8,35 +8,48 @@ the prompt are our own, so marks of other work cannot be compared one to one.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from unilavira_drake.errors import MllmError, ReplyFormatError
 from unilavira_drake.evaluation.scoring import Score
 from unilavira_drake.messages import Message
-from unilavira_drake.mllm.broker import AttemptListener
-from unilavira_drake.mllm.judges import make_judge
+from unilavira_drake.mllm.broker import Broker
 from unilavira_drake.mllm.prompt import template_text
-from unilavira_drake.mllm.reply import Attempt, Mllm
+from unilavira_drake.mllm.reply import Completion, MllmReply
 from unilavira_drake.mllm.reply_forms import JudgeReply
 from unilavira_drake.mllm.request import FreeVariables, MllmRequest
+from unilavira_drake.mllm.usage import ModelUsage, paid
 from unilavira_drake.task_choice import EpisodeTask
+
+RequestListener = Callable[[MllmRequest], None]
 
 MAX_REASKS = 1
 LOWEST, HIGHEST = 1, 5
+REASONING_LIMIT = 400
+"""Characters of a judge's sentence that are kept."""
 
 
 @dataclass(frozen=True)
 class Judgement(Message):
-    """A mark, and the sentence that explains it."""
+    """What a judge made of an answer, and what that cost."""
 
-    mark: int = LOWEST
+    model: str = ""
+    """The judge's name."""
+    mark: int | None = None
+    """From 1 to 5; None when no reply could be had."""
     reasoning: str = ""
+    """The sentence that explains the mark."""
+    usage: ModelUsage = ModelUsage()
+    error: str = ""
+    """Why there is no mark: the named error."""
+    interrupted: bool = False
+    """Whether there is none because a person did not wait for it."""
 
     @property
-    def score(self) -> float:
+    def score(self) -> float | None:
         """The mark as a number from 0 to 1."""
-        return (self.mark - LOWEST) / (HIGHEST - LOWEST)
+        return None if self.mark is None else (self.mark - LOWEST) / (HIGHEST - LOWEST)
 
 
 def judge_request(
@@ -59,88 +72,107 @@ def judge_request(
         feedback=feedback,
     )
     return MllmRequest(
-        n=1, attempt=int(bool(feedback)), seed=seed, call="judge", variables=FreeVariables(text)
+        role="judge",
+        n=1,
+        attempt=int(bool(feedback)),
+        seed=seed,
+        call="judge",
+        variables=FreeVariables(text),
     )
 
 
 def judge(
-    model: Mllm,
+    broker: Broker,
     question: str,
     answer: str,
     accepted: Sequence[str],
     *,
     seed: int = 0,
-    on_attempt: AttemptListener | None = None,
+    on_request: RequestListener | None = None,
 ) -> Judgement:
     """Returns a model's judgement on an answer; without an answer the model is not asked.
 
-    A reply that cannot be used is asked for once more, with what was wrong with it.
+    A reply that cannot be used is asked for once more, with what was wrong with it.  What stands
+    in the way of a mark is told and never raised.
 
     Args:
-        model: see :func:`unilavira_drake.mllm.judges.make_judge`.
+        broker: of the judge, see :func:`unilavira_drake.mllm.judges.make_judge`.
         question: as it was put to the agent.
         answer: the agent's.
         accepted: the expected answer first, then others that count.
         seed: of the episode.
-        on_attempt: called for each attempt of each call, see ``Broker``.
-
-    Raises:
-        MllmError: if no reply can be had.
-        ReplyFormatError: if the second reply cannot be used either.
+        on_request: called before the model is asked.
     """
+    made = Judgement(broker.backend.name)
     if not answer.strip():
-        return Judgement(LOWEST, "No answer was given.")
-    request = judge_request(question, answer, accepted, seed=seed)
+        return dataclasses.replace(made, mark=LOWEST, reasoning="No answer was given.")
+    feedback = ""
     while True:
+        request = judge_request(question, answer, accepted, seed=seed, feedback=feedback)
+        if on_request is not None:
+            on_request(request)
         try:
-            reply, _ = JudgeReply.read(_asked(model, request, on_attempt))
-            return Judgement(reply.score, reply.reasoning)
-        except ReplyFormatError as error:
-            if request.attempt >= MAX_REASKS or not error.worth_a_reask:
-                raise
-            request = judge_request(question, answer, accepted, seed=seed, feedback=str(error))
+            outcome = _outcome(broker, request)
+        except KeyboardInterrupt:
+            error = "interrupted before there was a mark."
+            return dataclasses.replace(made, error=error, interrupted=True)
+        made = dataclasses.replace(made, usage=made.usage + _cost(broker, request, outcome))
+        try:
+            if not isinstance(outcome, Completion):
+                raise outcome
+            reply, _ = JudgeReply.read(outcome.text)
+            return dataclasses.replace(made, mark=reply.score, reasoning=_short(reply.reasoning))
+        except (MllmError, ReplyFormatError) as error:
+            worth_it = isinstance(error, ReplyFormatError) and error.worth_a_reask
+            if request.attempt >= MAX_REASKS or not worth_it:
+                return dataclasses.replace(made, error=f"{type(error).__name__}: {error}")
+            feedback = str(error)
 
 
 def judge_episode(
-    spec: str,
+    broker: Broker | None,
     verdict: Score,
     task: EpisodeTask,
     answer: str,
     *,
     seed: int,
-    on_attempt: AttemptListener | None = None,
-) -> tuple[Score, str]:
-    """Returns the verdict with a judge's mark for the answer, and why there is none.
+    on_request: RequestListener | None = None,
+) -> Judgement | None:
+    """Returns a judge's word on the answer of an episode, and closes the broker.
 
-    There is nothing to judge without a judge's spec, for a task without expected answers, and
-    where nothing is scored.  An episode that has run is never lost for want of a judge.
+    There is nothing to judge without a judge, for a task without expected answers, and where
+    nothing is scored.  The episode is over: its budgets neither stop a judge nor count it, and it
+    is never lost for want of a mark.
     """
-    if not (spec and task.answers and verdict.answer_correct is not None):
-        return verdict, ""
-    model = make_judge(spec)
+    if broker is None:
+        return None
     try:
-        found = judge(model, task.spec.text, answer, task.answers, seed=seed, on_attempt=on_attempt)
-    except (MllmError, ReplyFormatError) as error:
-        return verdict, f"judge_model: {type(error).__name__}: {error}"
+        if not task.answers or verdict.answer_correct is None:
+            return None
+        return judge(broker, task.spec.text, answer, task.answers, seed=seed, on_request=on_request)
     finally:
-        model.close()
-    return dataclasses.replace(verdict, answer_score=found.score), ""
+        broker.close()
 
 
-def _asked(model: Mllm, request: MllmRequest, on_attempt: AttemptListener | None) -> str:
-    """Returns the text of a reply, telling every attempt that it took."""
+def _short(reasoning: str) -> str:
+    line = " ".join(reasoning.split())
+    return line if len(line) <= REASONING_LIMIT else f"{line[: REASONING_LIMIT - 3]}..."
+
+
+def _outcome(broker: Broker, request: MllmRequest) -> Completion | MllmError | ReplyFormatError:
     try:
-        completion = model.complete(request)
+        return broker.result(request)
     except (MllmError, ReplyFormatError) as error:
-        _tell(on_attempt, request, error.attempts)
-        raise
-    _tell(on_attempt, request, completion.attempts)
-    return completion.text
+        return error
 
 
-def _tell(
-    on_attempt: AttemptListener | None, request: MllmRequest, attempts: Sequence[Attempt]
-) -> None:
-    if on_attempt is not None:
-        for number, attempt in enumerate(attempts, start=1):
-            on_attempt(request, number, attempt)
+def _cost(
+    broker: Broker, request: MllmRequest, outcome: Completion | MllmError | ReplyFormatError
+) -> ModelUsage:
+    """Returns what one request to the judge used; its seconds are wall-clock, or as recorded."""
+    if isinstance(outcome, Completion):
+        reply = MllmReply(usage=outcome.usage)
+    else:
+        reply = MllmReply(usage=paid(outcome.attempts), error=type(outcome).__name__)
+    seconds = broker.latency(request)
+    return ModelUsage(asked=1).after(reply, attempts=outcome.attempts, seconds=seconds)

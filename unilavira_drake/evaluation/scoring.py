@@ -68,8 +68,6 @@ class Score(Message):
     same_room: bool | None = None
     goal_seen: bool | None = None
     answer_correct: bool | None = None
-    answer_score: float | None = None
-    """A judge's mark from 0 to 1; None without a judge."""
     notes: tuple[str, ...] = ()
     """Why a figure is not defined."""
 

@@ -128,14 +128,18 @@ def _answer(
     )
 
 
-def _evidence(reply: AnswerReply, request: MllmRequest) -> str:
-    """Returns the picture that an answer names; the label of a view is as good as its name."""
-    named = reply.evidence.strip().removeprefix(VIEW_LABEL).removesuffix(" view")
-    if named and named not in request.picture_names:
-        raise ReplyFormatError(
-            f"evidence {reply.evidence!r} names no picture of this prompt; give one of: "
-            f"{', '.join(request.picture_names)}."
-        )
+def _evidence(reply: AnswerReply, request: MllmRequest) -> tuple[str, ...]:
+    """Returns the pictures that an answer names; the label of a view is as good as its name."""
+    pictures = request.picture_names
+    named = tuple(
+        name.strip().removeprefix(VIEW_LABEL).removesuffix(" view") for name in reply.evidence
+    )
+    for name in named:
+        if name not in pictures:
+            raise ReplyFormatError(
+                f"evidence {name!r} names no picture of this prompt; choose among "
+                f"{', '.join(pictures)}."
+            )
     return named
 
 

@@ -65,7 +65,7 @@ def language_request(
             for direction in DIRECTIONS
         ),
         last_action=_last_action(last_action, history),
-        outcome=_outcome(panorama) if last_action.n else "",
+        outcome=panorama.outcome.words if last_action.n else "",
         rejection=last_action.reason if rejected else "",
         todo=None if todo is None else todo.items,
         todo_feedback=() if todo is None else todo.feedback,
@@ -82,6 +82,7 @@ def language_request(
         failed_direction="" if second_chance is None else second_chance.failed_direction,
         failed_pictures=tuple(picture.name for picture in failed_frames),
         can_climb=can_climb,
+        view_degrees=round(math.degrees(panorama.frame("front").intrinsics.horizontal_fov)),
         choices=task.choices,
         forgotten=_forgotten(history),
     )
@@ -118,11 +119,6 @@ def decision_text(record: DecisionRecord) -> str:
     action = " ".join(part for part in (record.tool, record.argument) if part)
     target = f" to '{record.target_desc}'" if record.target_desc else ""
     return f"{place}: {action}{target}: {record.outcome}"
-
-
-def _outcome(panorama: Panorama) -> str:
-    outcome = panorama.outcome
-    return f"{outcome.state}: {outcome.reason}" if outcome.reason else outcome.state
 
 
 def _last_action(action: LanguageAction, history: History) -> str:
@@ -164,7 +160,7 @@ def _waypoint_note(
         tried=tuple(
             _edge_text(edge, front)
             for edge in history.edges
-            if edge.waypoint == waypoint.id and (tells_failures or edge.outcome == "arrived")
+            if edge.waypoint == waypoint.id and (tells_failures or edge.arrived)
         ),
         offered=second_chance is not None and waypoint.id in second_chance.offers,
         picture=next((p.name for p in history.keyframes if p.number == waypoint.picture), ""),

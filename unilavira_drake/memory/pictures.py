@@ -50,12 +50,20 @@ def look_difference(first: bytes, second: bytes) -> float:
 
 
 def shown(pictures: tuple[KeyPicture, ...], keep: int) -> tuple[KeyPicture, ...]:
-    """Returns the window of a prompt: at least the latest ``keep``, at most three more."""
-    if not pictures:
-        return ()
-    surplus = max(0, pictures[-1].number - keep)
-    dropped = surplus - surplus % BLOCK
-    return tuple(picture for picture in pictures if picture.number > dropped)
+    """Returns the pictures of a prompt: at least ``keep`` if there are as many, at most three more.
+
+    Whenever there are ``keep + 4``, four go: the oldest of those taken on the way, and once there
+    are none of these, the oldest views at waypoints; so a place is shown longer than a way.
+    """
+    window: list[KeyPicture] = []
+    for picture in pictures:
+        window.append(picture)
+        if len(window) >= keep + BLOCK:
+            ways = [p for p in window if p.direction]
+            places = [p for p in window if not p.direction]
+            dropped = (ways + places)[:BLOCK]
+            window = [p for p in window if p not in dropped]
+    return tuple(window)
 
 
 def of_failed_leg(

@@ -115,9 +115,7 @@ def remember(
     """
     old = state.history
     target = vision.target_desc if vision.n == action.n and action.tool == "turn" else ""
-    outcome = panorama.outcome.state
-    if panorama.outcome.reason:
-        outcome += f": {panorama.outcome.reason}"
+    outcome = panorama.outcome.words
     state = _described(state, action)
     back = action.tool == "backtrack" and panorama.outcome.state == "arrived"
     if back and action.waypoint is not None and old.waypoint(action.waypoint) is not None:
@@ -135,7 +133,7 @@ def remember(
     returned = None
     if back:
         edges, returned = _mark_returned(edges, current, action.n)
-    decisions = _decided(old, action, target, outcome, bounds.decisions)
+    decisions = _decided(old, action, target, _told(panorama, target), bounds.decisions)
     n = panorama.n
     # What is seen now is no picture of the past yet: the prompt shows it in full anyway.
     past = tuple(p for p in state.pictures if p.direction or p.n != panorama.first)
@@ -159,6 +157,14 @@ def _described(state: WaypointState, action: LanguageAction) -> WaypointState:
         for w in old.waypoints
     )
     return dataclasses.replace(state, history=dataclasses.replace(old, waypoints=waypoints))
+
+
+def _told(panorama: Panorama, target: str) -> str:
+    """Returns the outcome as the history tells it, with how far the target still is."""
+    outcome = panorama.outcome
+    if outcome.remaining is None or not target:
+        return outcome.words
+    return f"{outcome.words}, {outcome.remaining:.1f} m from it"
 
 
 def _decided(
@@ -240,7 +246,7 @@ def _mark_returned(
     for i in reversed(range(len(edges))):
         edge = edges[i]
         if edge.waypoint == place and edge.n < backtrack:
-            if edge.outcome == "arrived":
+            if edge.arrived:
                 edge = dataclasses.replace(edge, outcome="returned")
             return (*edges[:i], edge, *edges[i + 1 :]), edge
     return edges, None

@@ -31,6 +31,7 @@ from unilavira_drake.messages.observation import (
     direction_of,
 )
 from unilavira_drake.messages.plans import (
+    ALREADY_THERE,
     TERMINAL_STATES,
     Goal,
     NavigationStatus,
@@ -40,6 +41,7 @@ from unilavira_drake.messages.plans import (
 from unilavira_drake.messages.voxels import VoxelMap
 
 __all__ = [
+    "ALREADY_THERE",
     "CALLS",
     "DIRECTIONS",
     "SWEEP_ORDERS",

@@ -47,8 +47,8 @@ class LanguageAction(Message):
     reason: str = ""
     """Why a stop was rejected, or why there is no action."""
     answer: str = ""
-    evidence: str = ""
-    """Of an answer: the view, or the name of the picture of the past, that settles it."""
+    evidence: tuple[str, ...] = ()
+    """Of an answer: the views, and the names of the pictures of the past, that settle it."""
     fallback: bool = False
     """Whether the documented safe action took the place of unusable replies."""
     repairs: tuple[str, ...] = ()

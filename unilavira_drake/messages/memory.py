@@ -93,9 +93,15 @@ class Edge(Message):
     n: int = 0
     """Number of the language action that took it."""
     outcome: str = ""
-    """``arrived``, ``failed: ...`` or ``returned`` (left again by a backtrack)."""
+    """``arrived`` (``arrived: already there`` without a drive), ``failed: ...`` or ``returned``
+    (left again by a backtrack)."""
     to: int | None = None
-    """The waypoint it led to; None when it did not arrive."""
+    """The waypoint it led to; None when it led to none."""
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the move ended well and was not given up since."""
+        return self.outcome.startswith("arrived")
 
 
 @dataclass(frozen=True)

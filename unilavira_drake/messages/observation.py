@@ -78,6 +78,13 @@ class Outcome(Message):
 
     state: str = "arrived"
     reason: str = ""
+    remaining: float | None = None
+    """Metres to what was aimed at after a drive; None without one."""
+
+    @property
+    def words(self) -> str:
+        """E.g. ``arrived`` or ``failed: stuck``."""
+        return f"{self.state}: {self.reason}" if self.reason else self.state
 
 
 @dataclass(frozen=True, eq=False)

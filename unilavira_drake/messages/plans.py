@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from unilavira_drake.messages.frozen import Message, read_only
 
 TERMINAL_STATES = ("arrived", "failed")
+ALREADY_THERE = "already there"
+"""Why an arrival was no drive: the robot stands beside the goal, or as near as it can get."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Goal(Message):
 
 @dataclass(frozen=True)
 class NavigationStatus(Message):
-    """How goal ``n`` goes: ``moving``, ``arrived`` or ``failed`` and why.
+    """How goal ``n`` goes: ``moving``, ``arrived`` or ``failed``, and why.
 
     The initial value (0, arrived) starts the ring.
     """
@@ -41,6 +43,9 @@ class NavigationStatus(Message):
     state: str = "arrived"
     reason: str = ""
     heading: float | None = None
+    remaining: float | None = None
+    """Metres straight from the robot to the goal's ``p_WG`` at the end of a drive; None without
+    one.  What was marked may stand on a table: the robot arrives as near as there is room."""
 
     @property
     def terminal(self) -> bool:

@@ -39,7 +39,7 @@ def make_backend(spec: str, *, role: str, place: str) -> Mllm:
     Nothing is written, connected or started before its first call.
 
     Args:
-        role: ``language`` | ``vision``: for which of the two it answers.
+        role: ``language`` | ``vision`` | ``judge``: for which of them it answers.
         place: where the spec stands, e.g. ``language_model``; opens an error's message.
 
     Raises:
@@ -47,7 +47,8 @@ def make_backend(spec: str, *, role: str, place: str) -> Mllm:
     """
     profile = profile_of(spec, place=place)
     if profile is not None:
-        return RemoteModel(profile, role=role)
+        # A judge reads: it has the key and the settings of a language model.
+        return RemoteModel(profile, role="language" if role == "judge" else role)
     name, _, rest = spec.partition(":")
     if name in _FOLDERS:
         if not rest:

@@ -200,5 +200,5 @@ def _fixed_reply(request: MllmRequest, name: str) -> dict[str, Any]:
     if call == "answer":
         choices = variables.choices if isinstance(variables, LanguageVariables) else ()
         first = next(iter(choices), "unknown")
-        return {"reasoning": f"{name} does not read the question", "evidence": "", "answer": first}
+        return {"reasoning": f"{name} does not read the question", "evidence": [], "answer": first}
     raise MllmError(f"{name}: unknown call {call!r}.")

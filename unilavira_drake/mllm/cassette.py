@@ -61,10 +61,11 @@ class CassetteHeader(_Record):
     seed: int = 0
     language: RecordedModel
     vision: RecordedModel
+    judge: RecordedModel | None = None
 
-    def model(self, role: str) -> RecordedModel:
-        """Returns the model of a role."""
-        return self.vision if role == "vision" else self.language
+    def model(self, role: str) -> RecordedModel | None:
+        """Returns the model of a role; None where no judge was recorded."""
+        return {"vision": self.vision, "judge": self.judge}.get(role, self.language)
 
 
 class RecordedImage(_Record):

@@ -62,8 +62,8 @@ class Replies:
 
 
 def _check_continued(path: Path, old: CassetteHeader, new: CassetteHeader) -> None:
-    """One cassette tells of one pair of models and one preset, or it would name the wrong ones."""
-    for what in ("language", "vision", "preset"):
+    """One cassette tells of the same models and one preset, or it would name the wrong ones."""
+    for what in ("language", "vision", "judge", "preset"):
         recorded, asked = getattr(old, what), getattr(new, what)
         if recorded != asked:
             raise ScenarioError(
@@ -72,8 +72,10 @@ def _check_continued(path: Path, old: CassetteHeader, new: CassetteHeader) -> No
             )
 
 
-def _named(value: RecordedModel | str) -> str:
-    return value if isinstance(value, str) else f"{value.name} ({value.perception})"
+def _named(value: RecordedModel | str | None) -> str:
+    if isinstance(value, RecordedModel):
+        return f"{value.name} ({value.perception})"
+    return value or "none"
 
 
 class CassetteWriter:

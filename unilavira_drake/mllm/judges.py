@@ -14,7 +14,7 @@ def make_judge(spec: str, *, place: str = "judge_model") -> Mllm:
         ScenarioError: if the spec names nothing that can be used, or a program of rules, which
             reads no free words.
     """
-    judge = make_backend(spec, role="language", place=place)
+    judge = make_backend(spec, role="judge", place=place)
     if judge.reasoning == "rules":
         raise ScenarioError(
             f"{place}: {spec!r} follows rules and cannot judge the words of an answer; give a "

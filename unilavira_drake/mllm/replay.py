@@ -7,7 +7,7 @@ import functools
 import time
 from pathlib import Path
 
-from unilavira_drake.errors import ReplyFormatError
+from unilavira_drake.errors import ReplyFormatError, ScenarioError
 from unilavira_drake.mllm.cassette import (
     CassetteHeader,
     RecordedModel,
@@ -30,10 +30,11 @@ class CassetteModel:
 
     Args:
         path: the cassette.
-        role: ``language`` | ``vision``.
+        role: ``language`` | ``vision`` | ``judge``.
 
     Raises:
-        ScenarioError: if there is no such file, or it is no cassette.
+        ScenarioError: if there is no such file, it is no cassette, or nobody judged when it was
+            recorded.
     """
 
     deadline = _DEADLINE
@@ -41,7 +42,14 @@ class CassetteModel:
     def __init__(self, path: Path, *, role: str) -> None:
         self._path = path
         self._header: CassetteHeader = read_header(path)
-        self._model: RecordedModel = self._header.model(role)
+        model = self._header.model(role)
+        if model is None:
+            raise ScenarioError(
+                f"cassette {str(path)!r}: holds no reply of a {role}; record an episode with a "
+                f"{role}_model, or name another model."
+            )
+        self._model: RecordedModel = model
+        self._answered_by = model.name if role == "judge" else self._header.answered_by
 
     @property
     def preset(self) -> str:
@@ -56,7 +64,7 @@ class CassetteModel:
     @property
     def answered_by(self) -> str:
         """Who answered when it was recorded."""
-        return self._header.answered_by or self._model.name
+        return self._answered_by or self._model.name
 
     @property
     def perception(self) -> str:
@@ -108,7 +116,7 @@ class RecordingModel:
 
     Args:
         backend: the model that is asked.
-        cassette: shared by both roles.
+        cassette: shared by all roles.
     """
 
     def __init__(self, backend: Mllm, cassette: CassetteWriter) -> None:

@@ -113,8 +113,8 @@ class AnswerReply(ReplyModel):
     """Reply to ``answer``."""
 
     reasoning: str
-    # The picture that settles it: a view, or a picture of the past by its name.
-    evidence: str = ""
+    # The pictures that settle it: views, and pictures of the past by their names.
+    evidence: list[str] = pydantic.Field(default_factory=list)
     answer: str
 
 

@@ -36,7 +36,9 @@ def request_schema(request: MllmRequest) -> Schema | None:
         if request.call == "plan_todo":
             properties["todo"]["minItems"] = 1
         if request.call == "answer":
-            properties["evidence"]["enum"] = [*request.picture_names, ""]
+            properties["evidence"]["maxItems"] = len(request.picture_names)
+            if request.picture_names:
+                properties["evidence"]["items"]["enum"] = list(request.picture_names)
             if variables.choices:
                 properties["answer"]["enum"] = list(variables.choices)
         if "action" in properties:

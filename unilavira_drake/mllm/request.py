@@ -89,6 +89,8 @@ class LanguageVariables(Message):
     failed_pictures: tuple[str, ...] = ()
     """On ``recover``: names of the pictures of the way that failed, e.g. ``H5``."""
     can_climb: bool = False
+    view_degrees: int = 79
+    """How wide a view is, degrees."""
     choices: tuple[str, ...] = ()
     """The closed vocabulary of a question's answer; empty when any words will do."""
     forgotten: tuple[int, ...] = ()

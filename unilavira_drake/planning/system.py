@@ -8,7 +8,14 @@ from typing import Any
 
 from pydrake.systems.framework import Context
 
-from unilavira_drake.messages import Goal, Message, NavigationStatus, OccupancyMap, Path
+from unilavira_drake.messages import (
+    ALREADY_THERE,
+    Goal,
+    Message,
+    NavigationStatus,
+    OccupancyMap,
+    Path,
+)
 from unilavira_drake.planning.navigation_grid import path_is_blocked
 from unilavira_drake.planning.plan import Plan, PlanningParameters, make_plan, warm_up
 from unilavira_drake.planning.polyline import final_heading, remaining_length
@@ -156,7 +163,9 @@ class FastMarchingPlanner(Level):
         if plan.reason:
             return _done(n, "failed", plan.reason, None)
         if plan.length <= self._tolerance:
-            return _done(n, "arrived", "", state.heading)
+            reason = "" if state.path.n == n else ALREADY_THERE
+            left = math.dist(state.position, state.target)
+            return _done(n, "arrived", reason, state.heading, left)
         version = state.path.version + 1 if state.path.n == n else 0
         return dc.replace(
             state,
@@ -174,20 +183,21 @@ class FastMarchingPlanner(Level):
     ) -> PlannerState:
         points = state.path.p_WP
         goal = (float(points[-1, 0]), float(points[-1, 1]))
+        left = math.dist(position, state.target)
         if math.dist(position, goal) <= self._tolerance:
             heading = final_heading(points) if state.heading is None else state.heading
-            return _done(state.status.n, "arrived", "", heading)
+            return _done(state.status.n, "arrived", "", heading, left)
         step = math.dist(position, state.position)
         if step >= PROGRESS:
             travelled = state.travelled + step
             state = dc.replace(state, travelled=travelled, position=position)
         if state.travelled > state.budget:
-            return _done(state.status.n, "failed", "travel budget", None)
+            return _done(state.status.n, "failed", "travel budget", None, left)
         remaining = remaining_length(points, *position)
         if remaining <= state.least_remaining - PROGRESS:
             state = dc.replace(state, least_remaining=remaining, progress_time=time)
         elif time - state.progress_time > self._stuck_time:
-            return _done(state.status.n, "failed", "stuck", None)
+            return _done(state.status.n, "failed", "stuck", None, left)
         return self._replanned(state, occupancy, position, goal, time)
 
     def _replanned(
@@ -220,6 +230,9 @@ class FastMarchingPlanner(Level):
         return self._planned(state, plan, occupancy, time)
 
 
-def _done(n: int, state: str, reason: str, heading: float | None) -> PlannerState:
+def _done(
+    n: int, state: str, reason: str, heading: float | None, remaining: float | None = None
+) -> PlannerState:
     """Returns the terminal state of goal n: its status and the empty path, in one message."""
-    return PlannerState(status=NavigationStatus(n, state, reason, heading), path=Path(n))
+    status = NavigationStatus(n, state, reason, heading, remaining)
+    return PlannerState(status=status, path=Path(n))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -77,8 +78,19 @@ class CountsResult:
 
 
 @dataclass(frozen=True)
-class UsageResult:
-    """What both models have cost; a cassette's replies cost what they did when recorded."""
+class JudgeResult:
+    """What the judge of an answer said; the mark counts as ``metrics.answer_score``."""
+
+    model: str = ""
+    mark: int | None = None
+    """From 1 to 5; None when no reply could be had, ``error`` then says why."""
+    reasoning: str = ""
+    """The sentence with which it explains the mark."""
+
+
+@dataclass(frozen=True)
+class RoleUsageResult:
+    """What one model has cost; a cassette's replies cost what they did when recorded."""
 
     input_tokens: int = 0
     output_tokens: int = 0
@@ -94,11 +106,53 @@ class UsageResult:
     """Requests on the wire: the rows of the ledger, calls that were given up left out."""
     errors: int = 0
     """Calls that brought an error instead of a reply."""
+    calls: int = 0
+    """Questions that were answered, by a reply or by an error."""
+
+
+@dataclass(frozen=True)
+class UsageResult(RoleUsageResult):
+    """What an episode has cost: the totals, and the part of each model in them.
+
+    The judge of an answer is asked after the episode, so no budget of the episode counts it.
+    """
+
+    language: RoleUsageResult | None = None
+    vision: RoleUsageResult | None = None
+    """As ``language``: None in a file that was written before there were these entries."""
+    judge: RoleUsageResult | None = None
+    """None where nobody judged."""
 
     @staticmethod
-    def of(usage: ModelUsage) -> UsageResult:
-        """Returns the totals of both models."""
-        return UsageResult(**asdict(usage.total), attempts=usage.attempts, errors=usage.errors)
+    def of(
+        language: ModelUsage, vision: ModelUsage, judge: ModelUsage | None = None
+    ) -> UsageResult:
+        """Returns the totals of all models and what each one has used."""
+        whole = language + vision + (judge or ModelUsage())
+        return UsageResult(
+            **_columns(whole),
+            language=RoleUsageResult(**_columns(language)),
+            vision=RoleUsageResult(**_columns(vision)),
+            judge=None if judge is None else RoleUsageResult(**_columns(judge)),
+        )
+
+    @staticmethod
+    def read(**fields: Any) -> UsageResult:
+        """Returns what the fields of a file tell."""
+        parts = {
+            name: RoleUsageResult(**fields[name])
+            for name in ("language", "vision", "judge")
+            if fields.get(name) is not None
+        }
+        return UsageResult(**{**fields, **parts})
+
+
+def _columns(usage: ModelUsage) -> dict[str, Any]:
+    return asdict(usage.total) | {
+        "attempts": usage.attempts,
+        "errors": usage.errors,
+        "calls": usage.calls,
+    }
 
 
 @dataclass(frozen=True)
@@ -128,6 +182,8 @@ class EpisodeResult:
     metrics: MetricsResult = MetricsResult()
     counts: CountsResult = CountsResult()
     usage: UsageResult = UsageResult()
+    judge: JudgeResult | None = None
+    """None where nobody judged."""
     time: TimeResult = TimeResult()
     versions: dict[str, str] = field(default_factory=dict)
 
@@ -136,12 +192,12 @@ class EpisodeResult:
         return json.dumps(asdict(self), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-_PARTS = {
+_PARTS: dict[str, Callable[..., Any]] = {
     "task": TaskResult,
     "model": ModelResult,
     "metrics": MetricsResult,
     "counts": CountsResult,
-    "usage": UsageResult,
+    "usage": UsageResult.read,
     "time": TimeResult,
 }
 
@@ -162,6 +218,8 @@ def result_from_json(text: str) -> EpisodeResult:
             )
         for name, part in _PARTS.items():
             fields[name] = part(**fields[name])
+        if fields.get("judge") is not None:
+            fields["judge"] = JudgeResult(**fields["judge"])
         return EpisodeResult(**fields)
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"result.json: not a result of an episode: {error}.") from None

@@ -10,6 +10,7 @@ from typing import TypeVar
 from unilavira_drake.errors import InputError
 from unilavira_drake.messages import (
     Goal,
+    Grounding,
     LanguageAction,
     NavigationStatus,
     Panorama,
@@ -55,6 +56,9 @@ class Step:
     attempts: tuple[Attempt, ...]
     action: LanguageAction | None
     vision: VisionAction | None
+    """The vision model's own mark."""
+    grounding: Grounding | None
+    """What the auxiliary grounder made of it; None without one."""
     goal: Goal | None
     changes: tuple[TodoChange, ...] | None
     """The TODO list with what became of each item; None without a list."""
@@ -177,6 +181,7 @@ def _step(n: int, entries: list[Entry], todo: tuple[TodoItem, ...]) -> Step:
         attempts=_attempts(entries),
         action=action,
         vision=_last(entries, VisionAction),
+        grounding=_last(entries, Grounding),
         goal=_last(entries, Goal),
         changes=changes,
         feedback=() if updated is None else updated.feedback,

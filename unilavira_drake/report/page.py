@@ -7,10 +7,8 @@ import dataclasses
 import functools
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import jinja2
 import numpy as np
@@ -19,7 +17,8 @@ from markupsafe import Markup
 from unilavira_drake.messages import Frame
 from unilavira_drake.messages.metrics import CAUSES
 from unilavira_drake.recording.polylines import arc_length, stretch
-from unilavira_drake.recording.result import EpisodeResult
+from unilavira_drake.report.doubt import GroundingPanel, grounding_panel
+from unilavira_drake.report.figures import run_figures
 from unilavira_drake.report.model import RunRecord, Step, read_run
 from unilavira_drake.report.pictures import Picture, Pictures
 from unilavira_drake.report.setting import read_setting
@@ -55,6 +54,7 @@ class StepPanel:
     chosen: ViewPanel | None
     pointed: bool
     """Whether there is a vision action to be shown on the chosen view."""
+    grounding: GroundingPanel | None
     first: int | None
     """The step under which the same panorama was first seen, if that was another one."""
     overlay: Overlay
@@ -87,7 +87,7 @@ def render_report(folder: Path) -> str:
             task=run.task or setting.task,
             goal=setting.goal or (run.result.task.goal if run.result is not None else ""),
             cause=CAUSES.get(run.result.cause, "") if run.result is not None else "",
-            figures=_figures(run),
+            figures=run_figures(run),
             panels=panels,
             sheet=sheet,
             frames=pictures.frames,
@@ -115,6 +115,7 @@ def _panel(step: Step, run: RunRecord, pictures: Pictures, sheet: Sheet) -> Step
         views=views,
         chosen=chosen,
         pointed=chosen is not None and step.vision is not None,
+        grounding=grounding_panel(step.grounding),
         first=None if first == step.n else first,
         overlay=sheet.overlay(step, uri),
         gone=_gone(step, run),
@@ -159,58 +160,22 @@ def _aim_distance(step: Step) -> float | None:
 
 def _parsed(step: Step) -> str:
     """The actions of a step as JSON, without fields that say nothing."""
+    said = {
+        "language_action": step.action,
+        "vision_action": step.vision,
+        "grounding": step.grounding,
+    }
     parts = {
         name: {
             key: value
-            for key, value in dataclasses.asdict(action).items()
-            if value not in (None, "", (), False)
+            for key, value in dataclasses.asdict(message).items()
+            # What a grounding holds of the vision action stands above it.
+            if value not in (None, "", (), False) and key != "action"
         }
-        for name, action in (("language_action", step.action), ("vision_action", step.vision))
-        if action is not None
+        for name, message in said.items()
+        if message is not None
     }
     return json.dumps(parts, indent=2, ensure_ascii=False) if parts else ""
-
-
-def _figures(run: RunRecord) -> tuple[tuple[str, str], ...]:
-    counts, result = run.counts, run.result
-    rows = list(_scores(result)) if result is not None else []
-    rows += [
-        ("simulated time", f"{run.simulated:.1f} s"),
-        ("decisions", str(counts.decisions)),
-        ("language calls", str(counts.language_calls)),
-        ("vision calls", str(counts.vision_calls)),
-        ("asked again", str(counts.reasks)),
-        ("fallbacks", str(counts.fallbacks)),
-        ("backtracks", str(counts.backtracks)),
-    ]
-    if result is not None and (result.usage.input_tokens or result.usage.output_tokens):
-        usage = result.usage
-        rows.append(("tokens", f"{usage.input_tokens} in, {usage.output_tokens} out"))
-        if usage.cost_usd is not None:
-            rows.append(("cost", f"{usage.cost_usd:.4f} USD"))
-    return tuple(rows)
-
-
-def _scores(result: EpisodeResult) -> tuple[tuple[str, str], ...]:
-    metrics = result.metrics
-    words = {True: "yes", False: "no", None: "–"}
-    answer = []
-    if metrics.answer is not None:
-        answer = [("answer", metrics.answer), ("answer correct", words[metrics.answer_correct])]
-    return (
-        *answer,
-        ("navigation error", _metres(metrics.navigation_error_m)),
-        ("in the goal's room", words[metrics.same_room]),
-        ("goal in the last view", words[metrics.goal_seen]),
-        ("path length", _metres(metrics.path_length_m)),
-        ("shortest path", _metres(metrics.shortest_path_m)),
-        ("SPL", "–" if metrics.spl is None else f"{metrics.spl:.2f}"),
-        ("collisions", str(metrics.collisions)),
-    )
-
-
-def _metres(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2f} m"
 
 
 def _policy(style: str, script: str) -> str:
@@ -234,7 +199,7 @@ def _asset(name: str) -> str:
 
 @functools.lru_cache(maxsize=1)
 def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
+    return jinja2.Environment(
         loader=jinja2.PackageLoader("unilavira_drake.report"),
         undefined=jinja2.StrictUndefined,
         # All of it: replies, scenes, names of things, paths.
@@ -243,6 +208,3 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
         auto_reload=False,
     )
-    filters: Mapping[str, Any] = {"metres": _metres}
-    environment.filters.update(filters)
-    return environment

@@ -14,10 +14,12 @@ import pydantic
 from unilavira_drake.errors import InputError
 from unilavira_drake.messages import Frame, Intrinsics, Message, OccupancyMap, Outcome, Panorama
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, VisionVariables
-from unilavira_drake.recording.recorder import PORTS
+from unilavira_drake.recording.recorder import GROUNDER_PORTS, PORTS
 from unilavira_drake.recording.run_folder import TRANSCRIPT
 
-_TYPES = {(system, event): type(default) for system, event, default in PORTS.values()}
+_TYPES = {
+    (system, event): type(default) for system, event, default in (PORTS | GROUNDER_PORTS).values()
+}
 _TOLD = 3
 """Broken lines that are told one by one."""
 

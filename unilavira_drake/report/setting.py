@@ -9,6 +9,7 @@ from unilavira_drake.errors import UniLaviraError
 from unilavira_drake.evaluation.goal_area import success_area
 from unilavira_drake.evaluation.scoring import make_goal_field
 from unilavira_drake.mllm.backends import make_backend
+from unilavira_drake.mllm.judges import make_judge
 from unilavira_drake.recording.floor_plan import FloorPlan, Outline, floor_plan
 from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.scenario import Scenario
@@ -26,6 +27,10 @@ _PERCEPTION = {
     "ground_truth": "sees what a perfect detector would say, from the simulator's labels",
     "images": "sees the pictures",
 }
+_GROUNDERS = {
+    "color": "finds things by their color in the pixels",
+    "label": "reads the simulator's labels",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +44,7 @@ class Setting:
     """What the episode is scored against; empty when it is not."""
     task: str = ""
     models: tuple[str, ...] = ()
-    """One sentence for each model."""
+    """One sentence for each model, and for the grounder."""
     problems: tuple[str, ...] = ()
 
 
@@ -81,9 +86,14 @@ def _described(scenario: Scenario) -> tuple[str, ...]:
         scenario.language_model, role="language", place="language_model"
     ).description
     vision = make_backend(scenario.vision_model, role="vision", place="vision_model").description
+    models = [f"Language model: {language}.", f"Vision model: {vision}."]
     if language == vision:
-        return (f"Both models: {language}.",)
-    return (f"Language model: {language}.", f"Vision model: {vision}.")
+        models = [f"Both models: {language}."]
+    if scenario.grounder in _GROUNDERS:
+        models.append(f"Auxiliary grounder: {_GROUNDERS[scenario.grounder]}.")
+    if scenario.judge_model:
+        models.append(f"Judge of answers: {make_judge(scenario.judge_model).description}.")
+    return tuple(models)
 
 
 def _declared(result: EpisodeResult | None) -> tuple[str, ...]:

@@ -40,7 +40,7 @@ def action_words(step: Step) -> str:
 
 
 def step_badges(step: Step) -> tuple[tuple[str, str], ...]:
-    """Returns what is unusual about a step: a kind (``bad``, ``warn`` or ``good``) and words."""
+    """Returns what is unusual about a step: ``bad``, ``warn``, ``good`` or ``note``, and words."""
     badges = []
     if step.call == "recover":
         badges.append(("warn", "recover"))
@@ -50,6 +50,9 @@ def step_badges(step: Step) -> tuple[tuple[str, str], ...]:
         badges.append(("bad", "fallback"))
     if any(attempt.reply is not None and attempt.reply.error for attempt in step.attempts):
         badges.append(("bad", "model error"))
+    if step.grounding is not None and step.grounding.doubt:
+        refined = step.grounding.refined
+        badges.append(("note", "mark refined") if refined else ("warn", "mark doubted"))
     if step.feedback:
         badges.append(("warn", "list refused"))
     done = sum(change.kind == "completed" for change in step.changes or ())

@@ -57,7 +57,7 @@ def _answer(situation: Situation) -> dict[str, Any]:
     seen = situation.scene.matching(thing) if thing else []
     if not seen:
         reason = "the thing asked about is not in view"
-        return {"reasoning": reason, "evidence": "", "answer": UNKNOWN}
+        return {"reasoning": reason, "evidence": [], "answer": UNKNOWN}
     shown = f"{seen[0].name} at {seen[0].near:.1f} m ({seen[0].id})"
     view, found = seen[0].direction, UNKNOWN
     if re.search(r"\bcolou?r\b", question):
@@ -70,7 +70,7 @@ def _answer(situation: Situation) -> dict[str, Any]:
         found = situation.scene.room or UNKNOWN
     elif re.match(r"(is|are|do|does|can)\b", question):
         found = "yes"
-    return {"reasoning": shown, "evidence": view, "answer": found}
+    return {"reasoning": shown, "evidence": [view], "answer": found}
 
 
 def _asked_thing(question: str) -> Clause | None:

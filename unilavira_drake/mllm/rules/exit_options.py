@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from unilavira_drake.mllm.rules.aim import Aim, on_side, side_cost, turn_cost
 from unilavira_drake.mllm.rules.clauses import Clause
 from unilavira_drake.mllm.rules.memory import explored, is_hub
-from unilavira_drake.mllm.rules.option import Option, beside, tried_cost
+from unilavira_drake.mllm.rules.option import Option, tried_cost
 from unilavira_drake.mllm.rules.sight import Exit
 from unilavira_drake.mllm.rules.situation import Situation
 from unilavira_drake.mllm.rules.vocabulary import usual_rooms
@@ -75,7 +75,7 @@ def _ordinal_exits(situation: Situation, aim: Aim) -> list[Exit] | None:
         return None
     doors = [e for e in situation.scene.exits if on_side(goal.side, e.sight.bearing, aim)]
     if goal.landmark:
-        doors.sort(key=lambda e: beside(e.sight, goal.landmark, situation))
+        doors.sort(key=lambda e: situation.scene.beside(e.sight, goal.landmark))
         return doors[:1]
     if "door" in situation.last_target and situation.origin is not None:
         return sorted(doors, key=lambda e: e.sight.distance)[:1]

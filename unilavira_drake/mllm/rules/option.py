@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from unilavira_drake.messages import VIEW_YAW
-from unilavira_drake.mllm.rules.clauses import Clause
-from unilavira_drake.mllm.rules.sight import Sight
+from unilavira_drake.messages import ALREADY_THERE, VIEW_YAW
 from unilavira_drake.mllm.rules.situation import Situation
 
 
@@ -42,12 +40,7 @@ def tried_cost(situation: Situation, direction: str) -> float:
     """Returns what earlier tries in a direction from here speak against it, metres."""
     here = situation.here
     tried = here.tried if here else ()
-    failures = sum(t.startswith(f"{direction}: failed") for t in tried)
+    useless = (f"{direction}: failed", f"{direction}: arrived: {ALREADY_THERE}")
+    failures = sum(t.startswith(useless) for t in tried)
     returns = sum(t.startswith(f"{direction}: ") for t in tried) - failures
     return 25.0 * min(failures, 1) + 3.0 * returns
-
-
-def beside(sight: Sight, landmark: str, situation: Situation) -> float:
-    """Returns how far a thing or door is from the nearest landmark of a class, metres."""
-    marks = situation.scene.matching(Clause("see", landmark))
-    return min((math.dist(sight.position, m.position) for m in marks), default=0.0)

@@ -9,7 +9,7 @@ from unilavira_drake.messages import VIEW_YAW, direction_of
 from unilavira_drake.mllm.rules.aim import Aim, side_cost, turn_cost
 from unilavira_drake.mllm.rules.exit_options import exit_options
 from unilavira_drake.mllm.rules.memory import is_hub
-from unilavira_drake.mllm.rules.option import Option, beside, tried_cost
+from unilavira_drake.mllm.rules.option import Option, tried_cost
 from unilavira_drake.mllm.rules.sight import angle_between
 from unilavira_drake.mllm.rules.situation import Situation
 
@@ -44,7 +44,7 @@ def _things(situation: Situation, aim: Aim) -> Iterator[Option]:
         return
     sights = situation.scene.matching(goal)
     if goal.landmark:
-        sights = sorted(sights, key=lambda s: beside(s, goal.landmark, situation))
+        sights = sorted(sights, key=lambda s: situation.scene.beside(s, goal.landmark))
     elif goal.ordinal > 1 and len(sights) >= goal.ordinal:
         sights = sights[goal.ordinal - 1 :]
     elif goal.ordinal == -1 or _towards_the_end(situation, aim):

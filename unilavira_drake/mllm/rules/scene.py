@@ -23,6 +23,11 @@ from unilavira_drake.mllm.rules.vocabulary import (
 _FULL_VOTE = 0.15
 """Share of a view that floor must cover for the view's full vote on where the robot is."""
 
+_SEEN_AROUND = 2.5
+"""What stands beside a thing nearer than this is in one of the views, metres."""
+_BESIDE = 2.0
+"""Two things nearer to each other than this stand side by side, metres between their middles."""
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -39,15 +44,32 @@ class Scene:
     """Measured free distance along each view's axis, metres."""
 
     def matching(self, clause: Clause) -> list[Sight]:
-        """Returns the things a clause means, best class match first, then nearest."""
+        """Returns the things a clause means, best class match first, then nearest.
+
+        What stands near the robot without the clause's landmark beside it is not meant; around
+        farther things not everything is seen.
+        """
         found = [
             (-class_match(clause.category, s.category), s.near, i)
             for i, s in enumerate(self.things)
             if class_match(clause.category, s.category)
             and (not clause.color or s.color == clause.color)
+            and (
+                not clause.landmark
+                or s.near > _SEEN_AROUND
+                or self.beside(s, clause.landmark) <= _BESIDE
+            )
         ]
         best = min((rank for rank, _, _ in found), default=0)
         return [self.things[i] for rank, _, i in sorted(found) if rank == best]
+
+    def beside(self, sight: Sight, landmark: str) -> float:
+        """Returns how far a thing or door is from the nearest landmark of a class, metres.
+
+        Infinite where no such landmark is in view.
+        """
+        marks = self.matching(Clause("see", landmark))
+        return min((math.dist(sight.position, m.position) for m in marks), default=math.inf)
 
 
 def look(views: Sequence[ViewEvidence], notes: Sequence[ViewNote]) -> Scene:

@@ -1,0 +1,88 @@
+"""The end of a run: what a judge said and what it cost, and words that are no commands."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from unilavira_drake.cli.summary import print_summary
+from unilavira_drake.mllm.reply import Usage
+from unilavira_drake.mllm.usage import ModelUsage
+from unilavira_drake.recording.result import (
+    EpisodeResult,
+    JudgeResult,
+    MetricsResult,
+    UsageResult,
+)
+
+LANGUAGE = ModelUsage(1, 0, 1, Usage(900, 90, 12, 0.25))
+UNPRICED = ModelUsage(1, 0, 1, Usage(900, 90, 12, None))
+JUDGE = ModelUsage(1, 0, 1, Usage(300, 30, 0, 0.5))
+ANSWERED = EpisodeResult(
+    scored=True,
+    success=False,
+    cause="stopped",
+    metrics=MetricsResult(answer="pink", answer_correct=False, answer_score=0.75),
+    judge=JudgeResult("a judge", 4, "Close to it."),
+    usage=UsageResult.of(LANGUAGE, ModelUsage(), JUDGE),
+)
+
+
+def printed(result: EpisodeResult) -> str:
+    stream = io.StringIO()
+    print_summary(result, Path("out"), Console(file=stream, width=200))
+    return stream.getvalue()
+
+
+def row(text: str, name: str) -> str:
+    cells = [[cell.strip() for cell in line.split("│")] for line in text.splitlines()]
+    (found,) = (line[2] for line in cells if len(line) == 4 and line[1] == name)
+    return found
+
+
+def test_the_mark_stands_beside_the_exact_match() -> None:
+    text = printed(ANSWERED)
+    assert row(text, "answer correct") == "no"
+    assert row(text, "answer score") == "0.75 (4 of 5 by a judge)"
+    assert row(text, "the judge's reason") == "Close to it."
+    assert row(text, "tokens") == "1200 in, 120 out; the judge's part 300 in, 30 out"
+    assert row(text, "cost") == "0.7500 USD; the judge's part 0.5000 USD"
+
+
+@pytest.mark.parametrize(
+    ("usage", "cost"),
+    [
+        (UsageResult.of(LANGUAGE, ModelUsage()), "0.2500 USD"),
+        (UsageResult.of(UNPRICED, ModelUsage(), JUDGE), "not known; the judge's part 0.5000 USD"),
+        (UsageResult.of(UNPRICED, ModelUsage()), None),
+        (UsageResult.of(ModelUsage(), ModelUsage()), None),
+    ],
+)
+def test_a_cost_is_told_as_far_as_it_is_known(usage: UsageResult, cost: str | None) -> None:
+    text = printed(dataclasses.replace(ANSWERED, judge=None, usage=usage))
+    assert "answer score" not in text
+    if cost is None:
+        assert "cost" not in text
+    else:
+        assert row(text, "cost") == cost
+
+
+def test_a_judge_that_gave_no_mark_is_told() -> None:
+    failed = dataclasses.replace(
+        ANSWERED,
+        error="judge_model: MllmUnreachable: down",
+        metrics=dataclasses.replace(ANSWERED.metrics, answer_score=None),
+        judge=JudgeResult("a judge"),
+    )
+    assert row(printed(failed), "answer score") == "none: judge_model: MllmUnreachable: down"
+
+
+@pytest.mark.parametrize("answer", ["[red]pink[/red]", "a [/b] b", "\x1b[31mpink\x07"])
+def test_an_answer_is_no_markup_and_no_command_to_the_terminal(answer: str) -> None:
+    shown = answer.replace("\x1b", " ").replace("\x07", " ").strip()
+    metrics = dataclasses.replace(ANSWERED.metrics, answer=answer)
+    assert row(printed(dataclasses.replace(ANSWERED, metrics=metrics)), "answer") == shown
