@@ -90,6 +90,44 @@ def test_a_visible_target_of_the_right_colour_is_chosen():
     assert "red sofa" in reply["reasoning_action"]
 
 
+BESIDE_PIANO = [("Go to the chair near the piano",)]
+
+
+def test_a_thing_at_hand_without_its_landmark_is_another_one():
+    views = evidence("study", left=(thing("left", 2, "chair", "green", 320, 1.2),))
+    reply = ask("decide", views, BESIDE_PIANO)
+    assert reply["todo_updates"] == []
+    assert reply["action"] != {"tool": "double_check"}
+    check = ask("double_check", views, [(*BESIDE_PIANO[0], "completed", "seen")])
+    assert check["confirmed"] is False
+
+
+def test_the_thing_beside_its_landmark_is_meant_even_if_another_is_nearer():
+    views = evidence(
+        "dining room",
+        left=(thing("left", 2, "chair", "green", 320, 1.2),),
+        back=(
+            thing("back", 2, "chair", "brown", 320, 2.2),
+            thing("back", 3, "piano", "black", 420, 3.0),
+        ),
+    )
+    reply = ask("decide", views, BESIDE_PIANO)
+    assert reply["action"] == {"tool": "turn", "direction": "back"}
+    assert "brown chair" in reply["reasoning_action"]
+
+
+def test_a_move_that_was_none_is_not_repeated():
+    views = evidence(
+        "living room",
+        left=(thing("left", 2, "sofa", "red", 320, 3.0),),
+        back=(thing("back", 2, "sofa", "red", 320, 4.0),),
+    )
+    todo = [("Go to the red sofa",)]
+    assert ask("decide", views, todo)["action"]["direction"] == "left"
+    here = WaypointNote(id=1, tried=("left: arrived: already there",))
+    assert ask("decide", views, todo, waypoints=(here,))["action"]["direction"] == "back"
+
+
 def test_a_target_at_hand_closes_its_item_with_the_detection_and_asks_for_the_check():
     views = evidence("living room", left=(thing("left", 2, "sofa", "red", 320, 1.2),))
     reply = ask("decide", views, [("Stop next to the red sofa",)])

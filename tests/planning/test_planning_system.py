@@ -7,7 +7,7 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from unilavira_drake.messages import Goal, NavigationStatus, OccupancyMap
+from unilavira_drake.messages import ALREADY_THERE, Goal, NavigationStatus, OccupancyMap
 from unilavira_drake.planning.system import FastMarchingPlanner
 
 PERIOD = 0.1
@@ -120,6 +120,15 @@ def test_arrival_hands_on_the_heading_and_empties_the_path():
     assert (bench.path.n, len(bench.path.p_WP)) == (1, 0)
     bench.wait(5)
     assert bench.status.n == 1  # the same goal is not taken up again
+
+
+def test_a_robot_that_need_not_move_says_so():
+    bench = Bench()
+    x, y = bench.position
+    bench.give("goal", go(x=x + 0.1, y=y))
+    status = bench.wait()
+    assert (status.state, status.reason) == ("arrived", ALREADY_THERE)
+    assert status.remaining == pytest.approx(0.1)
 
 
 def test_a_goal_in_a_wall_without_space_fails():

@@ -80,4 +80,4 @@ def of_failed_leg(
     wanted = min(len(outside), max(0, LEAST_OF_LEG - len(inside)))
     # Evenly spread, the latest included.
     chosen = tuple(outside[round((i + 1) * len(outside) / wanted) - 1] for i in range(wanted))
-    return chosen + inside
+    return tuple(sorted(chosen + inside, key=lambda picture: picture.number))

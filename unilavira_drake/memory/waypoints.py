@@ -126,7 +126,7 @@ def remember(
     waypoints = state.history.waypoints
     kept = {waypoint.id for waypoint in waypoints}
     edges = tuple(edge for edge in old.edges if edge.waypoint in kept)
-    if action.tool == "turn":
+    if action.tool == "turn" and old.current in kept:
         bearing = state.yaw + VIEW_YAW[action.direction]
         to = current if panorama.outcome.state == "arrived" and current != old.current else None
         edges += (Edge(old.current, action.direction, bearing, action.n, outcome, to),)

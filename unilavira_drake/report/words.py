@@ -18,6 +18,7 @@ _REASONING = (
     ("scene", "Scene"),
     ("reason", "Reason"),
     ("answer", "Answer"),
+    ("evidence", "Seen in"),
 )
 
 
@@ -67,8 +68,13 @@ def reasoning(step: Step) -> tuple[tuple[str, str, str], ...]:
     """Returns the fields in which the model reasoned: field, title and text."""
     if step.action is None:
         return ()
-    found = ((name, title, getattr(step.action, name)) for name, title in _REASONING)
-    return tuple((name, title, text) for name, title, text in found if text)
+    found = []
+    for name, title in _REASONING:
+        value = getattr(step.action, name)
+        text = value if isinstance(value, str) else ", ".join(value)
+        if text:
+            found.append((name, title, text))
+    return tuple(found)
 
 
 def outcome_words(step: Step) -> str:
@@ -83,4 +89,6 @@ def outcome_words(step: Step) -> str:
         return f"Failed: {step.status.reason or 'without a reason'}."
     if step.goal is not None and step.goal.kind == "stay":
         return "Nothing to drive: the next call sees the same panorama."
-    return "Arrived."
+    words = "Arrived" + (f": {step.status.reason}" if step.status.reason else "")
+    left = step.status.remaining
+    return f"{words}." if left is None else f"{words}, {left:.1f} m from what was aimed at."
