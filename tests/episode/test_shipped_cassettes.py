@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from unilavira_drake.episode import run_episode
 from unilavira_drake.errors import ScenarioError
+from unilavira_drake.mllm.cassette import CassetteHeader
 from unilavira_drake.mllm.cassette_file import read_header, read_replies
 from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.resources import cassettes_path
 from unilavira_drake.scenario_loading import load_scenario
 
 CASSETTES = sorted(path.stem for path in cassettes_path().glob("*.jsonl"))
+
+
+def task_name(header: CassetteHeader) -> str:
+    """Returns the named task that was recorded."""
+    tasks = load_scenario(header.scenario).tasks
+    return next(name for name, task in tasks.items() if task.text.split() == header.task.split())
 
 
 def replay(name: str, out: Path) -> EpisodeResult:
@@ -25,15 +33,25 @@ def replay(name: str, out: Path) -> EpisodeResult:
         "random_seed": header.seed,
         "ablation": header.ablation,
         "prompt_preset": header.preset,
-        "task": {"text": header.task},
+        "task": {"text": f"@{task_name(header)}"},
     }
     # JSON is YAML.
     return run_episode(load_scenario(header.scenario, json.dumps(overlay)), out=out)
 
 
-def test_there_is_one_of_each_home() -> None:
-    scenarios = {read_header(cassettes_path() / f"{name}.jsonl").scenario for name in CASSETTES}
-    assert {"apartment", "office"} <= scenarios
+def test_there_are_two_of_each_family_and_one_drives_back() -> None:
+    families: Counter[str] = Counter()
+    calls: Counter[str] = Counter()
+    for name in CASSETTES:
+        path = cassettes_path() / f"{name}.jsonl"
+        header = read_header(path)
+        families[load_scenario(header.scenario).tasks[task_name(header)].family] += 1
+        lines = path.read_text(encoding="utf-8").splitlines()
+        calls.update(json.loads(line)["call"] for line in lines[1:])
+    assert set(families) == {"vln", "objectnav", "eqa"}
+    assert min(families.values()) >= 2
+    # Driven back, and decided anew from the pictures of the way that failed.
+    assert calls["recover"] >= 1
 
 
 @pytest.mark.parametrize("name", CASSETTES)

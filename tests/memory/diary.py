@@ -7,6 +7,7 @@ and knows nothing of buffers, eviction or how edges are kept.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from dataclasses import dataclass, field
 
@@ -61,8 +62,8 @@ class Walk:
     bounds: MemoryBounds
     state: WaypointState = field(default_factory=WaypointState)
     legs: list[Leg] = field(default_factory=list)
-    pictures: dict[bytes, int] = field(default_factory=dict)
-    """Every picture of the past, and the number of the panorama that came next, or was it."""
+    pictures: dict[bytes, float] = field(default_factory=dict)
+    """Every picture, and when it was taken: n is panorama n, n + 0.5 the way after action n."""
     panorama: Panorama = field(default_factory=Panorama)
     action: LanguageAction = field(default_factory=LanguageAction)
     place: int = 0
@@ -81,7 +82,7 @@ class Walk:
         self._decide("turn", direction=direction)
         for i in range(seen):
             words = f"way {self.action.n}.{i}".encode()
-            self.pictures[words] = self.action.n + 1
+            self.pictures[words] = self.action.n + 0.5
             self.state = with_picture(
                 self.state, sight(words), n=self.action.n,
                 waypoint=self.state.history.current, direction=direction,
@@ -90,10 +91,15 @@ class Walk:
         self.place = place
         self._capture((x + shift, y - shift), yaw, outcome(reason))
 
-    def turn_in_vain(self, direction: str, reason: str = "unreachable") -> None:
-        """Chooses a direction in which the robot does not move at all."""
+    def turn_in_vain(self, direction: str) -> None:
+        """Chooses a direction in which there is no way."""
         self._decide("turn", direction=direction)
-        self._reissue(outcome(reason))
+        self._reissue(outcome("unreachable"))
+
+    def turn_to_here(self, direction: str) -> None:
+        """Chooses something beside which the robot already stands."""
+        self._decide("turn", direction=direction)
+        self._reissue(Outcome("arrived", "already there"))
 
     def back(self, waypoint: int, *, yaw: float = 0.0, shift: float = 0.0) -> None:
         """Drives back to a waypoint and arrives, not quite on its spot."""
@@ -126,7 +132,8 @@ class Walk:
 
     def pictures_of(self, leg: Leg) -> set[bytes]:
         """Returns what was seen between leaving a waypoint and being there again."""
-        return {jpeg for jpeg, n in self.pictures.items() if leg.n < n and n < (leg.back or n + 1)}
+        end = leg.back or math.inf
+        return {jpeg for jpeg, time in self.pictures.items() if leg.n < time < end}
 
     def _decide(self, tool: str, direction: str = "", waypoint: int | None = None) -> None:
         n = self.panorama.n
@@ -160,7 +167,7 @@ class Walk:
             self.legs.append(Leg(self.action.n, before, bearing, said, left=now != before))
         if self.action.tool == "backtrack" and told.state == "arrived":
             leg = self.last_leg(now)
-            if leg is not None and leg.outcome == "arrived":
+            if leg is not None and leg.outcome.startswith("arrived"):
                 leg.given_up = True
         for leg in self.legs:
             if leg.waypoint == now and leg.left and not leg.back:
@@ -175,6 +182,7 @@ def nearest_place(x: float, y: float) -> int:
     return min(range(len(PLACES)), key=lambda i: math.dist(PLACES[i], (x, y)))
 
 
+@functools.lru_cache(maxsize=1024)
 def sight(words: bytes) -> Sight:
     """Returns a picture that looks like no other: its look is noise drawn from its words."""
     generator = np.random.default_rng(list(words))

@@ -251,7 +251,7 @@ def test_recover_names_the_failed_direction_and_still_shows_all_four() -> None:
     text = _text(RECOVER)
     assert '"right" is not accepted' in text
     assert "oldest first: H1, H2." in text
-    assert "; this way has failed from here" in text
+    assert "; this way was given up" in text
     assert all(f"\nView {direction}: " in text for direction in DIRECTIONS)
     assert "No picture was taken on that way" in _text(_with(RECOVER, failed_pictures=()))
 

@@ -129,12 +129,17 @@ def remember(
     if action.tool == "turn" and old.current in kept:
         bearing = state.yaw + VIEW_YAW[action.direction]
         to = current if panorama.outcome.state == "arrived" and current != old.current else None
-        edges += (Edge(old.current, action.direction, bearing, action.n, outcome, to),)
+        left = current != old.current
+        edges += (Edge(old.current, action.direction, bearing, action.n, outcome, to, left),)
+    n = panorama.n
+    edges = tuple(
+        dataclasses.replace(e, back=n) if e.waypoint == current and e.left and not e.back else e
+        for e in edges
+    )
     returned = None
     if back:
-        edges, returned = _mark_returned(edges, current, action.n)
+        edges, returned = _mark_returned(edges, current)
     decisions = _decided(old, action, target, _told(panorama, target), bounds.decisions)
-    n = panorama.n
     # What is seen now is no picture of the past yet: the prompt shows it in full anyway.
     past = tuple(p for p in state.pictures if p.direction or p.n != panorama.first)
     window = shown(past, bounds.keyframes)
@@ -192,15 +197,16 @@ def _second_chance(
     failed = tuple(e for e in edges if e.outcome.startswith(("failed", "returned")))
     if returned is None:
         return SecondChance(n, offers, failed)
-    # From leaving the place until the backtrack began; nothing is kept on a way back.
+    # From leaving the place until the robot was back; nothing is kept on a way back.
     leg = tuple(p for p in state.pictures if _on_leg(p, returned))
     direction = direction_of(returned.bearing - panorama.yaw)
     return SecondChance(n, offers, failed, direction, of_failed_leg(leg, window))
 
 
-def _on_leg(picture: KeyPicture, left: Edge) -> bool:
-    """Whether a picture was taken after a place was left: on the way, or at a later waypoint."""
-    return picture.n > left.n or (picture.n == left.n and bool(picture.direction))
+def _on_leg(picture: KeyPicture, leg: Edge) -> bool:
+    """Whether a picture was taken between leaving a place and being back there."""
+    gone = picture.n > leg.n or (picture.n == leg.n and bool(picture.direction))
+    return gone and (leg.back is None or picture.n < leg.back)
 
 
 def _place(
@@ -236,16 +242,14 @@ def _place(
     return dataclasses.replace(state, history=history, next_id=added.id + 1), added.id
 
 
-def _mark_returned(
-    edges: tuple[Edge, ...], place: int, backtrack: int
-) -> tuple[tuple[Edge, ...], Edge | None]:
-    """Marks the edge by which ``place`` was last left as failed; returns it, too.
+def _mark_returned(edges: tuple[Edge, ...], place: int) -> tuple[tuple[Edge, ...], Edge | None]:
+    """Marks the edge by which ``place`` was last left as given up; returns it, too.
 
     A way that ended half-way (stuck) was left as well; its own failure stays its outcome.
     """
     for i in reversed(range(len(edges))):
         edge = edges[i]
-        if edge.waypoint == place and edge.n < backtrack:
+        if edge.waypoint == place and edge.left:
             if edge.arrived:
                 edge = dataclasses.replace(edge, outcome="returned")
             return (*edges[:i], edge, *edges[i + 1 :]), edge

@@ -97,6 +97,10 @@ class Edge(Message):
     (left again by a backtrack)."""
     to: int | None = None
     """The waypoint it led to; None when it led to none."""
+    left: bool = False
+    """Whether the robot was elsewhere when the move was over."""
+    back: int | None = None
+    """Number of the panorama with which it was first back at the waypoint; None while it is not."""
 
     @property
     def arrived(self) -> bool:

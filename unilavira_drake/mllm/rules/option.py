@@ -43,4 +43,4 @@ def tried_cost(situation: Situation, direction: str) -> float:
     useless = (f"{direction}: failed", f"{direction}: arrived: {ALREADY_THERE}")
     failures = sum(t.startswith(useless) for t in tried)
     returns = sum(t.startswith(f"{direction}: ") for t in tried) - failures
-    return 25.0 * min(failures, 1) + 3.0 * returns
+    return 25.0 * failures + 3.0 * returns
