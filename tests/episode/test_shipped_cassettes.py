@@ -16,6 +16,7 @@ from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.resources import cassettes_path
 from unilavira_drake.scenario_loading import load_scenario
 
+DEFAULT = "apartment"
 CASSETTES = sorted(path.stem for path in cassettes_path().glob("*.jsonl"))
 
 
@@ -61,6 +62,19 @@ def test_the_header_tells_who_answered_and_when(name: str) -> None:
     assert header.date
     for model in (header.language, header.vision):
         assert (model.perception, model.reasoning) == ("images", "model")
+
+
+@pytest.mark.parametrize("name", CASSETTES)
+def test_the_guide_tells_how_to_replay_it(name: str) -> None:
+    header = read_header(cassettes_path() / f"{name}.jsonl")
+    default = load_scenario(DEFAULT)
+    scenario = "" if header.scenario == DEFAULT else f"--scenario {header.scenario} "
+    task = task_name(header)
+    same = header.scenario == DEFAULT and default.default_task == task
+    chosen = scenario if same else f"{scenario}--task @{task} "
+    guide = Path(__file__).resolve().parents[2] / "docs" / "agent.md"
+    line = f"unilavira run {chosen}--model cassette:{name}"
+    assert line in guide.read_text(encoding="utf-8").splitlines()
 
 
 @pytest.mark.parametrize("name", CASSETTES)

@@ -11,7 +11,10 @@ from run_on_paper import TASK, write_run
 from unilavira_drake.errors import InputError
 from unilavira_drake.memory.todo import apply_updates
 from unilavira_drake.messages import LanguageAction, TodoItem, TodoList, TodoUpdate
+from unilavira_drake.mllm.reply import MllmReply
+from unilavira_drake.recording.transcript import transcript_line
 from unilavira_drake.report.model import RunRecord, read_run
+from unilavira_drake.report.reading import read_transcript
 from unilavira_drake.report.todo_change import todo_changes
 
 
@@ -188,6 +191,16 @@ def test_what_is_no_run_folder_is_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=fragment):
             read_run(folder)
+
+
+def test_line_ends_inside_a_text_do_not_end_its_line(tmp_path: Path) -> None:
+    words = "a\u2028b\u2029c\u0085d"
+    reply = MllmReply(n=1, text=words)
+    line = transcript_line(1.0, 1, "language_link", "model_reply", reply, {})
+    (tmp_path / "transcript.jsonl").write_text(line + "\n", encoding="utf-8")
+    transcript = read_transcript(tmp_path)
+    assert transcript.problems == ()
+    assert [entry.message.text for entry in transcript.entries] == [words]
 
 
 def test_an_empty_transcript_has_no_steps(tmp_path: Path) -> None:

@@ -48,4 +48,6 @@ def _identity(message: Any) -> tuple[Any, ...]:
     if isinstance(message, EpisodeMetrics):
         travel = int(message.path_length / METRICS_TRAVEL)
         return travel, message.collisions, message.cause
-    return message.n, getattr(message, "attempt", 0), getattr(message, "state", "")
+    state = getattr(message, "state", "")
+    # A map's ``state`` is a method.
+    return message.n, getattr(message, "attempt", 0), state if isinstance(state, str) else ""

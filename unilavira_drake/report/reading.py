@@ -69,7 +69,8 @@ def read_transcript(folder: Path) -> Transcript:
         text = path.read_bytes().decode("utf-8", "replace")
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}.") from None
-    lines = text.splitlines()
+    # Not splitlines: a text may hold other line ends, which JSON leaves as they are.
+    lines = text.removesuffix("\n").split("\n") if text else []
     entries, broken = [], []
     for number, line in enumerate(lines, start=1):
         try:
