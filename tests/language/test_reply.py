@@ -305,7 +305,12 @@ def test_an_answer_outside_the_closed_vocabulary_is_asked_again(answer: str) -> 
 
 @pytest.mark.parametrize(
     ("evidence", "named"),
-    [(["left"], ("left",)), (["left view", "H3"], ("left", "H3")), (["view left"], ("left",))],
+    [
+        (["left"], ("left",)),
+        (["View left", "H3: front view at waypoint 1"], ("left", "H3")),
+        (["the left view", "picture h3", "H3."], ("left", "H3")),
+        ([], ()),
+    ],
 )
 def test_an_answer_names_the_pictures_that_settle_it(
     evidence: list[str], named: tuple[str, ...]
@@ -313,10 +318,14 @@ def test_an_answer_names_the_pictures_that_settle_it(
     images = (ImagePart("H3: front view at waypoint 1"), ImagePart("view left"))
     request = dataclasses.replace(_request("answer", family="eqa"), images=images)
     reply = {"reasoning": "seen", "evidence": evidence, "answer": "red"}
-    assert parse_language_reply(json.dumps(reply), request).evidence == named
-    for wrong in ("H9", ""):
-        with pytest.raises(ReplyFormatError, match=r"no picture of this prompt; .*H3, left"):
-            parse_language_reply(json.dumps({**reply, "evidence": [wrong]}), request)
+    action = parse_language_reply(json.dumps(reply), request)
+    assert (action.evidence, action.repairs) == (named, ())
+    # An answer is not lost over the name of a picture.
+    reply["evidence"] = [*evidence, "H9", "left or H3"]
+    action = parse_language_reply(json.dumps(reply), request)
+    assert (action.answer, action.evidence) == ("red", named)
+    assert len(action.repairs) == 2
+    assert "H9" in action.repairs[0]
 
 
 def test_bad_json_is_the_same_error() -> None:

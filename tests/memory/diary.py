@@ -27,6 +27,7 @@ from unilavira_drake.messages import (
     Outcome,
     Panorama,
     VisionAction,
+    Waypoint,
 )
 
 PLACES = ((0.0, 0.0), (3.0, 0.0), (3.0, 2.5), (0.0, 3.0), (-2.5, 0.5), (6.0, -1.0), (1.0, -3.0))
@@ -49,6 +50,8 @@ class Leg:
     """The panorama with which it first was at the waypoint again; 0: not yet."""
     given_up: bool = False
     """Whether a backtrack brought it back although the leg had arrived."""
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of the waypoint, metres."""
 
     @property
     def failed(self) -> bool:
@@ -126,6 +129,18 @@ class Walk:
         self._decide("double_check")
         self._reissue(Outcome())
 
+    def _come_again(self) -> None:
+        """What failed from a place that left the buffer is of its new waypoint, if it gets one."""
+        remembered = {w.id: w.position for w in self.state.history.waypoints}
+        for leg in self.legs:
+            for number, position in remembered.items():
+                if (
+                    leg.failed
+                    and leg.waypoint not in remembered
+                    and math.dist(position, leg.position) < self.bounds.merge_distance
+                ):
+                    leg.waypoint = number
+
     def last_leg(self, waypoint: int) -> Leg | None:
         """Returns the leg by which the robot last left a waypoint."""
         return next((x for x in reversed(self.legs) if x.waypoint == waypoint and x.left), None)
@@ -157,14 +172,21 @@ class Walk:
         self.panorama = panorama
         if any(picture.jpeg == words for picture in self.state.pictures):
             self.pictures[words] = panorama.n
-        self._write(old.history.current, old.yaw)
+        self._write(old.history.waypoint(old.history.current), old.yaw)
 
-    def _write(self, before: int, yaw: float) -> None:
+    def _write(self, before: Waypoint | None, yaw: float) -> None:
         now, told = self.state.history.current, self.panorama.outcome
         if self.action.tool == "turn":
+            assert before is not None
             bearing = yaw + VIEW_YAW[self.action.direction]
             said = f"{told.state}: {told.reason}" if told.reason else told.state
-            self.legs.append(Leg(self.action.n, before, bearing, said, left=now != before))
+            self.legs.append(
+                Leg(
+                    self.action.n, before.id, bearing, said,
+                    left=now != before.id, position=before.position,
+                )
+            )  # fmt: skip
+        self._come_again()
         if self.action.tool == "backtrack" and told.state == "arrived":
             leg = self.last_leg(now)
             if leg is not None and leg.outcome.startswith("arrived"):

@@ -257,7 +257,7 @@ def test_a_backtrack_that_got_stuck_half_way_may_be_tried_again() -> None:
     assert told(walk) == [(1, "front", "returned")]
 
 
-def test_the_way_of_a_place_that_leaves_the_buffer_goes_with_it() -> None:
+def test_what_failed_from_a_place_is_told_again_when_the_robot_comes_there_again() -> None:
     walk = Walk(MemoryBounds(waypoints=3, decisions=4, keyframes=3, merge_distance=0.5))
     walk.start()
     walk.turn("front", 1)
@@ -268,6 +268,9 @@ def test_the_way_of_a_place_that_leaves_the_buffer_goes_with_it() -> None:
     assert [waypoint.id for waypoint in walk.state.history.waypoints] == [1, 3, 4]
     assert {edge.waypoint for edge in walk.state.history.edges} == {1}
     assert told(walk) == []
+    walk.turn("back", 1)
+    assert walk.state.history.current == 5
+    assert told(walk) == [(5, "left", "returned")]
 
 
 @pytest.mark.parametrize("choice", ["turn_in_vain", "turn_to_here"])

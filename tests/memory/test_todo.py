@@ -225,3 +225,23 @@ def test_properties_of_any_history(replies: list[tuple[TodoUpdate, ...]]) -> Non
     # The log of operations alone rebuilds the list.
     actions = [LanguageAction(n=n, todo_updates=ops) for n, ops in enumerate(replies, start=1)]
     assert functools.reduce(apply_updates, actions, TodoList()) == todo
+
+
+@pytest.mark.parametrize("text", ["It is done.", "task completed", "yes, OK", "!!", "a 1 2"])
+def test_words_that_prove_nothing(text: str) -> None:
+    assert not is_concrete(text)
+
+
+@pytest.mark.parametrize("text", ["the sofa is done up in red", "左转", "door", "Tür"])
+def test_words_that_say_something(text: str) -> None:
+    assert is_concrete(text)
+
+
+def test_what_was_refused_is_still_told_after_the_examiner_has_spoken() -> None:
+    done = TodoUpdate(op="update", index=1, status="completed", result="done")
+    before = TodoList(n=1, items=(TodoItem("find the sofa"),))
+    proposed = apply_updates(before, LanguageAction(2, "decide", todo_updates=(done,)))
+    assert len(proposed.feedback) == 1
+    checked = apply_updates(proposed, LanguageAction(3, "double_check", confirmed=False))
+    assert checked.feedback == proposed.feedback
+    assert apply_updates(checked, LanguageAction(4, "decide")).feedback == ()

@@ -22,7 +22,7 @@ from unilavira_drake.mllm.reply_forms import (
     VerdictReply,
 )
 from unilavira_drake.mllm.reply_model import ReplyModel, bounded, clipped
-from unilavira_drake.mllm.request import VIEW_LABEL, LanguageVariables, MllmRequest
+from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 from unilavira_drake.tasks import asks
 
 MAX_PLAN_ITEMS = 32
@@ -51,7 +51,8 @@ def parse_language_reply(text: str, request: MllmRequest) -> LanguageAction:
     if not isinstance(variables, LanguageVariables):
         raise TypeError(f"request {request.n} of role {request.role!r} has no language variables")
     reply, repairs = REPLY_MODELS[request.call].read(text)
-    return dataclasses.replace(_action(reply, request, variables), repairs=repairs)
+    action = _action(reply, request, variables)
+    return dataclasses.replace(action, repairs=repairs + action.repairs)
 
 
 def _action(
@@ -118,29 +119,35 @@ def _answer(
                 f"exactly one of: {', '.join(variables.choices)}."
             )
         answer = choice
+    evidence, repairs = _evidence(reply, request)
     return LanguageAction(
         n=request.n,
         call=request.call,
         tool="stop",
         progress_analysis=clipped(reply.reasoning, REASONING_LIMIT),
         answer=answer,
-        evidence=_evidence(reply, request),
+        evidence=evidence,
+        repairs=repairs,
     )
 
 
-def _evidence(reply: AnswerReply, request: MllmRequest) -> tuple[str, ...]:
-    """Returns the pictures that an answer names; the label of a view is as good as its name."""
-    pictures = request.picture_names
-    named = tuple(
-        name.strip().removeprefix(VIEW_LABEL).removesuffix(" view") for name in reply.evidence
-    )
-    for name in named:
-        if name not in pictures:
-            raise ReplyFormatError(
-                f"evidence {name!r} names no picture of this prompt; choose among "
-                f"{', '.join(pictures)}."
-            )
-    return named
+def _evidence(reply: AnswerReply, request: MllmRequest) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Returns the pictures that an answer names, and what was left out of it.
+
+    An answer is worth more than the name of a picture: the words around a name are forgiven, and
+    what names none is left out.
+    """
+    pictures = {name.casefold(): name for name in request.picture_names}
+    named: list[str] = []
+    repairs = []
+    for text in reply.evidence:
+        words = (word.strip(".,'\"()") for word in text.partition(":")[0].casefold().split())
+        found = [pictures[word] for word in words if word in pictures]
+        if len(found) == 1:
+            named += found
+        else:
+            repairs.append(f"evidence {text!r} names no picture of the prompt; it was left out")
+    return tuple(dict.fromkeys(named)), tuple(repairs)
 
 
 def _decision(

@@ -9,9 +9,10 @@ class MemoryConfig:
 
     waypoints: int = 32
     # Decisions told in the history.
-    decisions: int = 8
-    # Pictures of the past that stay in the prompt once there are so many; the oldest are dropped
-    # four at a time, so up to three more are shown. The preset paper keeps twice as many.
+    decisions: int = 4
+    # Pictures of the past that stay in the prompt once there are so many; four are dropped at a
+    # time, those from the way first, so up to three more are shown. The preset paper keeps twice
+    # as many.
     keyframes: int = 8
     # Travel between two pictures on the way, metres.
     keyframe_travel: float = 1.5

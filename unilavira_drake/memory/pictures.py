@@ -2,8 +2,8 @@
 
 Pictures are numbered in the order of capture and never renumbered, and a prompt shows them oldest
 first, so that a prompt begins as the one before it did and a provider can serve that part from its
-cache.  Dropping the oldest one at each call would break this at each call; they are dropped in
-blocks instead.
+cache.  Dropping one at each call would break this at each call; they are dropped in blocks instead,
+those taken on the way first.
 """
 
 from __future__ import annotations

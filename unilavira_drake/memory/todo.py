@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from dataclasses import dataclass
 
 from unilavira_drake.messages import LanguageAction, TodoItem, TodoList, TodoUpdate
@@ -12,7 +13,14 @@ MAX_ITEMS = 32
 MIN_LETTERS = 3
 """A content or a result with fewer letters says nothing."""
 
-_EMPTY_WORDS = frozenset({"done", "complete", "completed", "finished", "none", "null", "yes"})
+_EMPTY_WORDS = frozenset(
+    (
+        *("done", "complete", "completed", "finished", "none", "null", "true", "yes", "ok", "now"),
+        *("it", "is", "was", "has", "been", "this", "that", "the", "a", "task", "item", "step"),
+    )
+)
+_WHOLE_WORDS = 0x3040
+"""From this code point on, a letter of Chinese, Japanese or Korean says as much as several."""
 
 
 @dataclass
@@ -25,9 +33,10 @@ class _Slot:
 
 
 def is_concrete(text: str) -> bool:
-    """Whether a text says something: 3 letters or more, and not just 'done' or the like."""
-    letters = sum(character.isalpha() for character in text)
-    return letters >= MIN_LETTERS and text.strip(" .!").lower() not in _EMPTY_WORDS
+    """Whether a text says something: 3 letters or more beside 'it is done' and the like."""
+    words = (w for w in re.findall(r"[^\W_]+", text.casefold()) if w not in _EMPTY_WORDS)
+    letters = (character for word in words for character in word if character.isalpha())
+    return sum(2 if ord(letter) >= _WHOLE_WORDS else 1 for letter in letters) >= MIN_LETTERS
 
 
 def apply_updates(todo: TodoList, action: LanguageAction) -> TodoList:
@@ -46,7 +55,9 @@ def apply_updates(todo: TodoList, action: LanguageAction) -> TodoList:
         if complaint:
             feedback.append(complaint)
     items = tuple(slot.item for slot in slots if slot.item is not None)
-    return TodoList(n=action.n, items=items, feedback=tuple(feedback))
+    # The examiner of a stop changes nothing: whoever decides next is to hear what was refused.
+    kept = todo.feedback if action.call == "double_check" else ()
+    return TodoList(n=action.n, items=items, feedback=kept + tuple(feedback))
 
 
 def _apply(slots: list[_Slot], update: TodoUpdate) -> str:

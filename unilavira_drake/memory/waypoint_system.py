@@ -63,8 +63,8 @@ class WaypointMemory(Level):
         period: polling period, seconds.
         waypoints: size of the buffer; the oldest but the first is evicted.
         decisions: past decisions told in the history.
-        keyframes: pictures of the past that stay in the history once there are so many; the
-            oldest are dropped in blocks of four.
+        keyframes: pictures of the past that stay in the history once there are so many; they
+            are dropped in blocks of four, those from the way first.
         keyframe_travel: travel between two pictures on the way, metres.
         merge_distance: a panorama this close to a waypoint is at that waypoint, metres.
         picture_width: width of the pictures, pixels; None keeps the camera's.

@@ -33,6 +33,9 @@ from unilavira_drake.messages import (
     direction_of,
 )
 
+MOST_LOST = 128
+"""Failures remembered of places that left the buffer."""
+
 
 @dataclass(frozen=True)
 class Sight(Message):
@@ -68,6 +71,8 @@ class WaypointState(Message):
     """The look of the latest of them."""
     watch: Watch = Watch()
     next_id: int = 1
+    lost: tuple[tuple[tuple[float, float, float], Edge], ...] = ()
+    """Where the waypoints stood that left the buffer, and the ways that failed from there."""
 
 
 @dataclass(frozen=True)
@@ -123,15 +128,13 @@ def remember(
         current = action.waypoint
     else:
         state, current = _place(state, panorama, target, sight, bounds)
-    waypoints = state.history.waypoints
-    kept = {waypoint.id for waypoint in waypoints}
-    edges = tuple(edge for edge in old.edges if edge.waypoint in kept)
-    if action.tool == "turn" and old.current in kept:
+    n, waypoints, edges = panorama.n, state.history.waypoints, old.edges
+    if action.tool == "turn":
         bearing = state.yaw + VIEW_YAW[action.direction]
         to = current if panorama.outcome.state == "arrived" and current != old.current else None
         left = current != old.current
         edges += (Edge(old.current, action.direction, bearing, action.n, outcome, to, left),)
-    n = panorama.n
+    edges, lost = _kept(edges, old, state, bounds.merge_distance)
     edges = tuple(
         dataclasses.replace(e, back=n) if e.waypoint == current and e.left and not e.back else e
         for e in edges
@@ -147,9 +150,36 @@ def remember(
         state,
         history=History(n, current, waypoints, edges, decisions, window),
         second_chance=_second_chance(n, current, panorama, state, edges, returned, window),
+        lost=lost,
         yaw=panorama.yaw,
         watch=Watch(panorama.position[:2], panorama.yaw),
     )
+
+
+def _kept(
+    edges: tuple[Edge, ...], old: History, state: WaypointState, merge_distance: float
+) -> tuple[tuple[Edge, ...], tuple[tuple[tuple[float, float, float], Edge], ...]]:
+    """Returns the edges of the remembered waypoints, and those that failed elsewhere.
+
+    A failure is remembered for the episode: where the robot comes again to a place that has left
+    the buffer, its failures are those of the new waypoint.
+    """
+    here = {waypoint.id: waypoint.position for waypoint in state.history.waypoints}
+    found, lost = [], []
+    for position, edge in state.lost:
+        again = next((i for i, p in here.items() if math.dist(p, position) < merge_distance), None)
+        if again is None:
+            lost.append((position, edge))
+        else:
+            found.append(dataclasses.replace(edge, waypoint=again))
+    for edge in edges:
+        if edge.waypoint in here:
+            found.append(edge)
+        elif edge.failed:
+            place = old.waypoint(edge.waypoint)
+            assert place is not None
+            lost.append((place.position, edge))
+    return tuple(sorted(found, key=lambda edge: edge.n)), tuple(lost[-MOST_LOST:])
 
 
 def _described(state: WaypointState, action: LanguageAction) -> WaypointState:
@@ -194,7 +224,7 @@ def _second_chance(
     window: tuple[KeyPicture, ...],
 ) -> SecondChance:
     offers = tuple(w.id for w in state.history.waypoints if w.id != current)
-    failed = tuple(e for e in edges if e.outcome.startswith(("failed", "returned")))
+    failed = tuple(edge for edge in edges if edge.failed)
     if returned is None:
         return SecondChance(n, offers, failed)
     # From leaving the place until the robot was back; nothing is kept on a way back.

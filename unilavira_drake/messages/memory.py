@@ -107,6 +107,11 @@ class Edge(Message):
         """Whether the move ended well and was not given up since."""
         return self.outcome.startswith("arrived")
 
+    @property
+    def failed(self) -> bool:
+        """Whether the move failed, or was given up since."""
+        return self.outcome.startswith(("failed", "returned"))
+
 
 @dataclass(frozen=True)
 class DecisionRecord(Message):

@@ -12,8 +12,7 @@ UNREACHABLE = "model_unreachable"
 INTERRUPTED = "interrupted"
 UNCOUNTED = "tokens_not_counted"
 UNSCORED = (UNREACHABLE, INTERRUPTED, UNCOUNTED)
-"""Causes that are not the agent's doing."""
-"""The cause with which nothing is scored."""
+"""Causes that are not the agent's doing: nothing is scored."""
 CAUSES = {
     "stopped": "The agent ended the episode by its own verified stop.",
     "decision_budget": "The decisions of the budget are used up, and the last one is carried out.",

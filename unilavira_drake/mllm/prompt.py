@@ -5,7 +5,7 @@ Everything that a model, a scene or a person has written is quoted as one JSON s
 length, so it can neither end its quotation nor start a line of the prompt.
 
 What stays the same from call to call comes first, for the caches of providers: the rules, the
-task, the pictures of the past, which are only added to until the oldest are dropped in a block.
+task, the pictures of the past, which are only added to until some are dropped in a block.
 Then comes what changes: notes, this call's question, the views, events, the TODO list.
 """
 

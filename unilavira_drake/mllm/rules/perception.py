@@ -30,10 +30,11 @@ def perceived(request: MllmRequest, dials: RulesDials) -> MllmRequest:
 
 
 def _remembered(variables: LanguageVariables, window: int) -> LanguageVariables:
-    """Returns the variables with the last decisions, and the waypoints at which they were made."""
+    """Returns the variables with the last decisions, their waypoints and the latest ones."""
     decisions = variables.decisions[-window:]
     known = {variables.current_waypoint}
     known |= {int(number) for note in decisions for number in _PLACE.findall(note.text)}
+    known |= set(sorted(note.id for note in variables.waypoints)[-window:])
     waypoints = tuple(note for note in variables.waypoints if note.id in known)
     return dataclasses.replace(variables, decisions=decisions, waypoints=waypoints)
 
