@@ -59,7 +59,6 @@ VARIABLES = LanguageVariables(
         ),
     ),
     decisions=(DecisionNote(2, "at waypoint 1: turn front to 'door frame': arrived"),),
-    failed_edges=("waypoint 2, right: failed: stuck",),
 )
 PAST = (
     ImagePart("H1: front view at waypoint 1", b"first", "low"),
@@ -100,19 +99,18 @@ FIRST = _with(
     current_waypoint=1,
     waypoints=(WaypointNote(1),),
     decisions=(),
-    failed_edges=(),
 )
 RECOVER = _with(
     dataclasses.replace(DECIDE, call="recover"),
     failed_direction="right",
     failed_pictures=("H1", "H2"),
 )
-BARE = {"todo": None, "todo_feedback": (), "second_chance": False, "failed_edges": ()}
+BARE = {"todo": None, "todo_feedback": (), "second_chance": False}
 GOLDENS = {
     "plan_todo": FIRST,
     "decide": DECIDE,
     "decide_no_tdm": _with(DECIDE, todo=None, todo_feedback=()),
-    "decide_no_scb": _with(DECIDE, second_chance=False, failed_edges=()),
+    "decide_no_scb": _with(DECIDE, second_chance=False),
     "decide_no_both": _with(DECIDE, **BARE),
     "decide_again": dataclasses.replace(DECIDE, attempt=1, feedback="The key scene is missing."),
     "recover": RECOVER,

@@ -294,7 +294,7 @@ def test_calls_do_not_depend_on_the_periods_of_the_levels() -> None:
             "waypoint_memory": WaypointMemory(
                 period=periods[3],
                 waypoints=32,
-                decisions=8,
+                decisions=4,
                 keyframes=8,
                 keyframe_travel=1.5,
                 merge_distance=0.5,

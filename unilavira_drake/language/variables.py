@@ -76,9 +76,6 @@ def language_request(
         ),
         decisions=tuple(DecisionNote(d.n, decision_text(d)) for d in history.decisions),
         second_chance=second_chance is not None,
-        failed_edges=()
-        if second_chance is None
-        else _failed_edges(second_chance, history, panorama),
         failed_direction="" if second_chance is None else second_chance.failed_direction,
         failed_pictures=tuple(picture.name for picture in failed_frames),
         can_climb=can_climb,
@@ -149,7 +146,6 @@ def _waypoint_note(
     dx, dy = waypoint.position[0] - x, waypoint.position[1] - y
     front = _front(waypoint, panorama, history)
     target, scene = waypoint.caption
-    tells_failures = second_chance is not None and not second_chance.revert_only
     return WaypointNote(
         id=waypoint.id,
         distance=round(math.hypot(dx, dy), 2),
@@ -157,14 +153,17 @@ def _waypoint_note(
         heading=_degrees(waypoint.heading - panorama.yaw),
         target=target,
         scene=scene,
-        tried=tuple(
-            _edge_text(edge, front)
-            for edge in history.edges
-            if edge.waypoint == waypoint.id and (tells_failures or edge.arrived)
-        ),
+        tried=tuple(_edge_text(edge, front) for edge in _tried(waypoint, history, second_chance)),
         offered=second_chance is not None and waypoint.id in second_chance.offers,
         picture=next((p.name for p in history.keyframes if p.number == waypoint.picture), ""),
     )
+
+
+def _tried(waypoint: Waypoint, history: History, second_chance: SecondChance | None) -> list[Edge]:
+    """Returns the directions tried from a waypoint; failures are a second chance's to tell."""
+    edges = [edge for edge in history.edges if edge.arrived]
+    edges += () if second_chance is None else second_chance.failed_edges
+    return sorted((e for e in edges if e.waypoint == waypoint.id), key=lambda edge: edge.n)
 
 
 def _edge_text(edge: Edge, front: float) -> str:
@@ -174,18 +173,6 @@ def _edge_text(edge: Edge, front: float) -> str:
         return f"{direction}: given up{place}"
     place = f" at waypoint {edge.to}" if edge.to is not None else ""
     return f"{direction}: {edge.outcome}{place}"
-
-
-def _failed_edges(
-    second_chance: SecondChance, history: History, panorama: Panorama
-) -> tuple[str, ...]:
-    texts = []
-    for edge in second_chance.failed_edges:
-        waypoint = history.waypoint(edge.waypoint)
-        if waypoint is not None:
-            text = _edge_text(edge, _front(waypoint, panorama, history))
-            texts.append(f"waypoint {edge.waypoint}, {text}")
-    return tuple(texts)
 
 
 def _front(waypoint: Waypoint, panorama: Panorama, history: History) -> float:

@@ -83,7 +83,6 @@ class LanguageVariables(Message):
     decisions: tuple[DecisionNote, ...] = ()
     second_chance: bool = True
     """Whether ``backtrack`` exists (SCB)."""
-    failed_edges: tuple[str, ...] = ()
     failed_direction: str = ""
     """On ``recover``: the direction that failed from here."""
     failed_pictures: tuple[str, ...] = ()
@@ -95,6 +94,16 @@ class LanguageVariables(Message):
     """The closed vocabulary of a question's answer; empty when any words will do."""
     forgotten: tuple[int, ...] = ()
     """Numbers of the waypoints that the buffer had no room for any more."""
+
+    @property
+    def failed_edges(self) -> tuple[str, ...]:
+        """What is told as failed or given up, e.g. ``waypoint 2, left: failed: stuck``."""
+        return tuple(
+            f"waypoint {note.id}, {text}"
+            for note in self.waypoints
+            for text in note.tried
+            if not text.partition(": ")[2].startswith("arrived")
+        )
 
 
 @dataclass(frozen=True)
