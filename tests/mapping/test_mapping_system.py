@@ -152,3 +152,73 @@ def test_a_cloned_context_has_the_same_future(intrinsics, ray_cast):
     occupancy = bench.run(3.0)
     assert occupancy.version == other.version
     assert occupancy.log_odds.tobytes() == other.log_odds.tobytes()
+
+
+def on_floor(x, z, yaw=0.0, pitch=0.0):
+    return RigidTransform(RollPitchYaw(0, pitch, yaw), [x, 0, z])
+
+
+def test_each_storey_has_its_map_and_versions_go_on_counting(intrinsics, ray_cast):
+    """Up a lift at 5 s, and down again at 10 s; the camera sees the same hall on both storeys."""
+
+    def height(t):
+        return 3.0 if 5.0 <= t < 10.0 else 0.0
+
+    bench = Bench(lambda t: on_floor(0.3 * math.sin(t), height(t)), intrinsics, ray_cast)
+    bench.camera._cast = lambda X_WC, boxes: ray_cast(
+        np.vstack((X_WC[:2], [[*X_WC[2, :3], 0.88]], X_WC[3:])), boxes
+    )
+    ground = bench.run(4.9)
+    assert [s.height for s in bench.mapper.storeys(bench.context)] == [0.0]
+    versions = [ground.version]
+    for time in np.arange(5.0, 15.0, 0.1):
+        versions.append(bench.run(float(time)).version)
+    assert versions == sorted(versions)
+    storeys = bench.mapper.storeys(bench.context)
+    assert [s.height for s in storeys] == [0.0, 3.0]
+    below, above = (s.occupancy for s in storeys)
+    assert bench.run(15.0).cells is below.cells
+    known = above.log_odds != 0
+    assert known.sum() > 1000
+    assert np.mean(np.sign(above.log_odds[known]) == np.sign(below.log_odds[known])) > 0.95
+    assert above.cells.tiles.keys() <= below.cells.tiles.keys()
+
+
+def test_a_slope_is_floor_to_a_robot_that_tilts_with_it(intrinsics, ray_cast):
+    """The hall lies on a ramp of 1:6, and so does the robot."""
+    X_WP = RigidTransform(RollPitchYaw(0.0, -math.atan(1 / 6), 0.0), [0.0, 0.0, 0.5])
+    bench = Bench(lambda t: X_WP @ planar(0, 0, 0), intrinsics, ray_cast)
+    bench.camera._cast = lambda X_WC, boxes: ray_cast(X_WP.inverse().GetAsMatrix4() @ X_WC, boxes)
+    occupancy = bench.run(0.15)
+    assert all(occupancy.state_at(x, 0.02) == "free" for x in (1.5, 2.5, 3.5))
+    # The wall leans towards the robot.
+    states = {occupancy.state_at(x, 0.02) for x in np.arange(3.7, 4.0, 0.05)}
+    assert "occupied" in states
+
+
+def test_nonsense_leaves_the_map_and_is_told(intrinsics, ray_cast):
+    lost = [False]
+    bench = Bench(
+        lambda t: planar(math.nan if lost[0] else 0.0, 0, 0),
+        intrinsics,
+        lambda X, b: ray_cast(X, b),
+    )
+    before = bench.run(1.0)
+    assert before.rejected == ()
+    lost[0] = True
+    after = bench.run(4.5)
+    assert after.cells is before.cells
+    assert (after.version, after.time) == (before.version, before.time)
+    assert after.rejected == ("view 0: the robot's position is not finite, or beyond 1e+06 m",)
+    # A sweep is counted, or the ring would wait for it for ever; a bad frame in it is left out.
+    lost[0] = False
+    seen = panorama(1, planar(0, 0, 0), intrinsics, ray_cast)
+    broken = dc.replace(seen.frames[1], depth=np.zeros((3, 4), np.float32))
+    bench.show(dc.replace(seen, frames=(seen.frames[0], broken, *seen.frames[2:])))
+    told = bench.run(4.65)
+    assert (told.n, told.version) == (1, before.version + 1)
+    assert told.rejected == ("view 1: the depth image is 4 x 3, its intrinsics 160 x 120",)
+    bench.show(dc.replace(seen, n=2, first=2, frames=(broken,) * 4))
+    kept = bench.run(4.75)
+    assert (kept.n, kept.version, len(kept.rejected)) == (2, told.version, 4)
+    assert kept.cells is told.cells

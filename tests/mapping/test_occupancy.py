@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from unilavira_drake.mapping.depth_scan import HIT_STEP, LIMIT, symmetric_columns
-from unilavira_drake.mapping.occupancy import DepthView, MappingParameters, integrate
+from unilavira_drake.mapping.depth_view import DepthView
+from unilavira_drake.mapping.occupancy import MAX_FRAME, MappingParameters, integrate
 from unilavira_drake.messages import Intrinsics, OccupancyMap
 
 PARAMETERS = MappingParameters()
@@ -181,6 +182,68 @@ def test_the_grid_grows_in_blocks_and_keeps_what_it_knew(look, ray_cast, intrins
     assert second.log_odds[second.cell(9.0, -7.0)] < 0
 
 
+def shared(one, other):
+    """Which tiles of a map are also those of another."""
+    return {key for key, tile in one.cells.tiles.items() if other.cells.tiles.get(key) is tile}
+
+
+def test_tiles_that_did_not_change_are_shared(look, ray_cast, intrinsics):
+    here, there = look(0, 0), look(12.0, 0)
+    views = [DepthView(ray_cast(X, (CRATE,), hall=(-20, -20, 20, 20)), intrinsics, X)
+             for X in (here, there)]  # fmt: skip
+    first = build(views[:1])
+    second = build(views[1:], first, position=(12.0, 0.0))
+    assert shared(first, second) == set(first.cells.tiles)
+    third = build(views[:1], second)
+    assert shared(second, third) >= set(second.cells.tiles) - set(first.cells.tiles)
+    assert shared(second, third) != set(second.cells.tiles)
+    for _ in range(12):
+        third = build(views[:1], third)
+    # Beyond doubt nothing changes any more.
+    assert shared(third, build(views[:1], third)) == set(third.cells.tiles)
+
+
+def test_a_robot_carried_ten_kilometres_away_leaves_nothing_in_between(look, ray_cast, intrinsics):
+    def seen(occupancy, x):
+        X_WC = look(x, 0)
+        depth = ray_cast(look(0, 0), (CRATE,))
+        return build([DepthView(depth, intrinsics, X_WC)], occupancy, position=(x, 0.0))
+
+    home = seen(None, 0.0)
+    away = seen(home, 10_000.0)
+    assert len(away.cells.tiles) == 2 * len(home.cells.tiles)
+    assert shared(home, away) == set(home.cells.tiles)
+    assert max(away.shape) < 400
+    assert away.state_at(10_002.0, 0.0) == home.state_at(2.0, 0.0) == "free"
+    assert away.state_at(2.0, 0.0) == "free"
+    back = seen(away, 0.0)
+    assert max(back.shape) < 400
+    np.testing.assert_array_equal(np.sign(back.log_odds), np.sign(home.log_odds))
+
+
+def test_a_long_way_keeps_the_frame_in_bounds_and_the_map_whole(look, ray_cast, intrinsics):
+    hall = (-1e4, -3.0, 1e4, 3.0)
+    parameters = dc.replace(PARAMETERS, resolution=0.2)
+    occupancy, lengths = OccupancyMap(), []
+    for x in np.arange(0.0, 2000.0, 4.0).tolist():
+        view = DepthView(ray_cast(look(x, 0), (), hall=hall), intrinsics, look(x, 0))
+        occupancy = build([view], occupancy, position=(x, 0.0), parameters=parameters)
+        lengths.append(occupancy.shape[1])
+        i, j = occupancy.cell(x, 0.0)
+        assert 0 <= i < occupancy.shape[0]
+        assert 0 <= j < occupancy.shape[1]
+        assert occupancy.log_odds[i, j] < 0
+    # It grows to its bound, and is cut behind the robot.
+    assert 0.98 * MAX_FRAME < max(lengths) <= MAX_FRAME
+    assert min(lengths[lengths.index(max(lengths)) :]) >= MAX_FRAME // 2
+    assert all(occupancy.state_at(x, 0.0) == "free" for x in range(2000))
+    # What lies far behind comes into sight again.
+    view = DepthView(ray_cast(look(9.0, 0), (), hall=hall), intrinsics, look(9.0, 0))
+    occupancy = build([view], occupancy, position=(9.0, 0.0), parameters=parameters)
+    assert occupancy.log_odds[occupancy.cell(100.0, 0.0)] < 0
+    assert occupancy.shape[1] <= MAX_FRAME
+
+
 def test_the_floor_under_the_robot_is_free():
     occupancy = build([], position=(1.0, 2.0))
     x, y = centers(occupancy, occupancy.log_odds < 0)
@@ -218,11 +281,53 @@ def test_any_depth_image_is_survived(depth, yaw, pitch):
     level = np.array([[s, 0.0, c], [-c, 0.0, s], [0.0, -1.0, 0.0]])
     X_WC[:3, :3] = level @ np.array([[1.0, 0.0, 0.0], [0.0, cp, sp], [0.0, -sp, cp]])
     X_WC[2, 3] = 0.9
-    lens = Intrinsics(16, 12, 8.0, 8.0, 7.5, 5.5)
+    lens = Intrinsics(depth.shape[1], depth.shape[0], 8.0, 8.0, 7.5, 5.5)
     parameters = dc.replace(PARAMETERS, stride=1)
     occupancy = build([DepthView(depth, lens, X_WC)], parameters=parameters)
     rows, columns = np.nonzero(occupancy.log_odds)
     assert np.abs(occupancy.log_odds).max() <= LIMIT
     x = occupancy.origin[0] + (columns + 0.5) * 0.05
     y = occupancy.origin[1] + (rows + 0.5) * 0.05
-    assert np.hypot(x, y).max() <= 5.1
+    assert np.hypot(x, y).max(initial=0.0) <= 5.1
+
+
+def test_saturated_readings_are_none(look, ray_cast, intrinsics):
+    X_WC = look(0, 0)
+    depth = ray_cast(X_WC, ())
+    parameters = dc.replace(PARAMETERS, saturation=65.5)
+    blind = DepthView(np.where(depth > 2.0, np.float32(0.0), depth), intrinsics, X_WC)
+    expected = build([blind]).log_odds
+    for value in (65.535, np.inf, 70.0):
+        saturated = DepthView(np.where(depth > 2.0, np.float32(value), depth), intrinsics, X_WC)
+        assert np.array_equal(build([saturated], parameters=parameters).log_odds, expected)
+        # Taken for a distance, it tells of free floor, or of a drop.
+        assert not np.array_equal(build([saturated]).log_odds, expected)
+
+
+def test_one_look_is_enough_where_it_is_asked_to_be(look, ray_cast, intrinsics):
+    X_WC = look(0, 0)
+    empty = DepthView(ray_cast(X_WC, ()), intrinsics, X_WC)
+    full = DepthView(ray_cast(X_WC, ((2, -0.2, 0, 2.4, 0.2, 1),)), intrinsics, X_WC)
+
+    def front_is_there(occupancy):
+        return any(occupancy.state_at(2.02, y) == "occupied" for y in (-0.12, 0.02, 0.12))
+
+    for free_step, before, after in ((4, 1, 3), (4, 10, 10), (LIMIT, 1, 1), (LIMIT, 10, 1)):
+        parameters = dc.replace(PARAMETERS, free_step=free_step)
+        occupancy = build([full] * before, parameters=parameters)
+        for looks in range(after + 1):
+            assert front_is_there(occupancy) == (looks < after)
+            occupancy = build([empty], occupancy, parameters=parameters)
+
+
+def test_parameters_that_make_no_sense_are_refused(look, ray_cast, intrinsics):
+    for name, value in (
+        ("resolution", 0.0), ("resolution", math.nan), ("max_range", -1.0),
+        ("max_range", 51.0), ("footprint_radius", 1e9), ("stride", 0), ("free_step", 0),
+        ("saturation", math.nan),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match="must be"):
+            dc.replace(PARAMETERS, **{name: value})
+    occupancy = build([], parameters=dc.replace(PARAMETERS, resolution=0.1))
+    with pytest.raises(ValueError, match=r"cells are 0.1 m"):
+        build([], occupancy)

@@ -8,21 +8,30 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageDepth32F
 
 from unilavira_drake.mapping.depth_scan import warm_up
-from unilavira_drake.mapping.occupancy import DepthView, MappingParameters, integrate
+from unilavira_drake.mapping.depth_view import DepthView
+from unilavira_drake.mapping.occupancy import MappingParameters, integrate
+from unilavira_drake.mapping.storeys import Storey, Storeys
 from unilavira_drake.messages import Intrinsics, Message, OccupancyMap, Panorama
-from unilavira_drake.ports import Level, image_input, message_input, pose_input
+from unilavira_drake.ports import (
+    Level,
+    image_input,
+    message_input,
+    pixels,
+    pose_input,
+    pose_matrix,
+)
 
 
 @dc.dataclass(frozen=True)
 class MapperState(Message):
-    """The map, and the pose and time of the latest integration."""
+    """The map, all storeys, and the pose and time of the latest integration."""
 
     occupancy: OccupancyMap = OccupancyMap()
+    storeys: Storeys = Storeys()
     position: tuple[float, float] = (0.0, 0.0)
     yaw: float = 0.0
     time: float = -math.inf
@@ -34,7 +43,12 @@ class OccupancyMapper(Level):
     The map's ``n`` is the number of the latest panorama it holds.  A panorama re-issued under a
     new number (same frames) only renews ``n``.  The depth image is evaluated, and so rendered,
     only when the robot moved ``travel`` or turned ``turn`` since the last integration, or
-    ``rest_period`` has passed; also while the observer sweeps.
+    ``rest_period`` has passed; also while the observer sweeps.  Views that make no sense are left
+    out; the map's ``rejected`` says why.
+
+    Heights count from the plane on which the base stands, so slopes are floor to a robot that
+    tilts with them.  ``map`` is that of the storey where the robot is; its version goes on counting
+    when that is another one, see :mod:`unilavira_drake.mapping.storeys`.
 
     .. pydrake_system::
 
@@ -57,6 +71,7 @@ class OccupancyMapper(Level):
         stride: every so many rows and columns of the image are read.
         travel: metres between two integrations.
         turn: radians between two integrations.
+        saturation: readings from here on are none, metres.
         rest_period: seconds between two integrations at rest.
         base_height: height of the base frame's origin above the floor, metres.
         period: seconds between two polls.
@@ -72,6 +87,7 @@ class OccupancyMapper(Level):
         max_height: float = 1.40,
         footprint_radius: float = 0.36,
         stride: int = 2,
+        saturation: float = math.inf,
         travel: float = 0.15,
         turn: float = math.radians(15.0),
         rest_period: float = 2.0,
@@ -87,6 +103,7 @@ class OccupancyMapper(Level):
             max_height=max_height,
             footprint_radius=footprint_radius,
             stride=stride,
+            saturation=saturation,
         )
         self._travel = travel
         self._turn = turn
@@ -99,32 +116,34 @@ class OccupancyMapper(Level):
         self.declare_output("map", lambda state: state.occupancy, OccupancyMap())
         warm_up()
 
+    def storeys(self, context: Context) -> tuple[Storey, ...]:
+        """Returns the maps of all storeys, in the order in which they were found."""
+        state: MapperState = self.state(context)
+        return state.storeys.known
+
     def step(self, context: Context, state: Any) -> Any:
         """Returns the state after the newest panorama or depth image; see the class."""
         panorama = self._panorama(context)
-        X_WB = self._pose(context)
+        X_WB = pose_matrix(self._pose(context))
         if panorama.first > state.occupancy.n:
             views = tuple(DepthView.of(frame) for frame in panorama.frames)
-            floor_height = panorama.position[2] - self._base_height
-            return self._integrated(context, state, X_WB, views, panorama.n, floor_height)
+            return self._integrated(context, state, X_WB, panorama.X_WB, views, panorama.n)
         if panorama.n > state.occupancy.n:
             occupancy = dc.replace(state.occupancy, n=panorama.n)
             return dc.replace(state, occupancy=occupancy)
         if not self._due(context.get_time(), state, X_WB):
             return state
         image = self._depth_image(context)
-        X_WC = (X_WB @ self._X_BC(context)).GetAsMatrix4()
-        pixels: Any = image.data
-        depth: NDArray[np.float32] = pixels[:, :, 0]
-        floor_height = float(X_WB.translation()[2]) - self._base_height
-        views = (DepthView(depth, self._intrinsics, X_WC),)
-        return self._integrated(context, state, X_WB, views, state.occupancy.n, floor_height)
+        X_WC = pose_matrix(self._pose(context) @ self._X_BC(context))
+        views = (DepthView(pixels(image)[:, :, 0], self._intrinsics, X_WC),)
+        return self._integrated(context, state, X_WB, X_WB, views, state.occupancy.n)
 
-    def _due(self, time: float, state: MapperState, X_WB: RigidTransform) -> bool:
+    def _due(self, time: float, state: MapperState, X_WB: NDArray[np.float64]) -> bool:
         if time - state.time >= self._rest_period - 1e-9:
             return True
-        x, y, _ = X_WB.translation()
-        if math.hypot(x - state.position[0], y - state.position[1]) >= self._travel:
+        if not np.isfinite(X_WB).all():
+            return False
+        if math.hypot(*(X_WB[:2, 3] - state.position)) >= self._travel:
             return True
         return abs(math.remainder(_yaw(X_WB) - state.yaw, math.tau)) >= self._turn
 
@@ -132,25 +151,34 @@ class OccupancyMapper(Level):
         self,
         context: Context,
         state: MapperState,
-        X_WB: RigidTransform,
+        X_WB: NDArray[np.float64],
+        X_WB_seen: NDArray[np.float64],
         views: tuple[DepthView, ...],
         n: int,
-        floor_height: float,
     ) -> MapperState:
-        x, y, _ = X_WB.translation()
-        position = (float(x), float(y))
+        """Returns the state after views that were taken when the base was at ``X_WB_seen``."""
+        time, position = context.get_time(), (float(X_WB[0, 3]), float(X_WB[1, 3]))
+        up = (float(X_WB_seen[0, 2]), float(X_WB_seen[1, 2]), float(X_WB_seen[2, 2]))
+        floor_height = float(X_WB_seen[2, 3]) - self._base_height / max(up[2], 0.5)
+        storeys = state.storeys.at(floor_height, position)
         occupancy = integrate(
-            state.occupancy,
+            storeys.occupancy,
             views,
             parameters=self._parameters,
             position=position,
             floor_height=floor_height,
             n=n,
-            time=context.get_time(),
+            time=time,
+            up=up,
         )
-        return MapperState(occupancy, position, _yaw(X_WB), context.get_time())
+        if occupancy.version == storeys.occupancy.version:
+            # Nothing could be believed; motion is measured from the last pose that was one.
+            occupancy = dc.replace(state.occupancy, n=n, rejected=occupancy.rejected)
+            return dc.replace(state, occupancy=occupancy, time=time)
+        # The versions of all storeys are one count.
+        occupancy = dc.replace(occupancy, version=state.occupancy.version + 1)
+        return MapperState(occupancy, storeys.mapped(occupancy), position, _yaw(X_WB), time)
 
 
-def _yaw(X_WB: RigidTransform) -> float:
-    R = X_WB.rotation().matrix()
-    return math.atan2(R[1, 0], R[0, 0])
+def _yaw(X_WB: NDArray[np.float64]) -> float:
+    return math.atan2(X_WB[1, 0], X_WB[0, 0])

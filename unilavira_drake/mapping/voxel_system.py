@@ -13,7 +13,7 @@ from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageDepth32F
 
 from unilavira_drake.mapping import voxels_carving, voxels_queries
-from unilavira_drake.mapping.occupancy import DepthView
+from unilavira_drake.mapping.depth_view import DepthView
 from unilavira_drake.mapping.voxels import VoxelParameters, integrate_voxels
 from unilavira_drake.messages import Intrinsics, Message, Panorama, VoxelMap, read_only
 from unilavira_drake.ports import (

@@ -11,16 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.kernels import frozen_view
-from unilavira_drake.mapping.occupancy import DepthView
+from unilavira_drake.mapping.depth_view import DepthView, fault_of
 from unilavira_drake.mapping.voxels_carving import apply, carve, extent, sample
 from unilavira_drake.messages import Message, VoxelMap
 from unilavira_drake.messages.voxels import TILE, overlap, tiles_between
 
 MAX_SPAN = 400
 """Most voxels between the camera and the end of its range."""
-
-FARTHEST = 1e6
-"""A camera farther than this from the world's origin along an axis is not believed, metres."""
 
 
 @dc.dataclass(frozen=True)
@@ -93,28 +90,6 @@ def integrate_voxels(
         tiles=tiles,
         rejected=tuple(rejected),
     )
-
-
-def fault_of(view: DepthView) -> str:
-    """Returns why a view cannot be integrated; empty if it can."""
-    depth, lens = np.asarray(view.depth), view.intrinsics
-    if depth.ndim != 2 or depth.size == 0 or depth.dtype.kind != "f":
-        return f"a depth image is (H, W) of floats, not {depth.shape} of {depth.dtype}"
-    if depth.shape != (lens.height, lens.width):
-        shape = f"{depth.shape[1]} x {depth.shape[0]}"
-        return f"the depth image is {shape}, its intrinsics {lens.width} x {lens.height}"
-    numbers = (lens.fx, lens.fy, lens.cx, lens.cy)
-    if not all(map(math.isfinite, numbers)) or min(lens.fx, lens.fy) <= 0.0:
-        return f"impossible intrinsics: fx, fy, cx, cy = {numbers}"
-    X_WC = np.asarray(view.X_WC)
-    if X_WC.shape != (4, 4) or X_WC.dtype.kind != "f" or not np.isfinite(X_WC).all():
-        return "the camera's pose is not a finite 4 x 4 matrix"
-    R_WC = X_WC[:3, :3]
-    if np.abs(R_WC).max() > 2.0 or np.abs(R_WC @ R_WC.T - np.eye(3)).max() > 1e-3:
-        return "the camera's rotation is not a rotation"
-    if np.abs(X_WC[:3, 3]).max() > FARTHEST:
-        return f"the camera is farther than {FARTHEST:g} m from the world's origin"
-    return ""
 
 
 def _integrate_view(

@@ -30,12 +30,12 @@ from unilavira_drake.messages.observation import (
     Sweep,
     direction_of,
 )
+from unilavira_drake.messages.occupancy import OccupancyMap
 from unilavira_drake.messages.plans import (
     ALREADY_THERE,
     TERMINAL_STATES,
     Goal,
     NavigationStatus,
-    OccupancyMap,
     Path,
 )
 from unilavira_drake.messages.voxels import VoxelMap

@@ -1,4 +1,4 @@
-"""Where to go and how it goes: goal, map, path and navigation status."""
+"""Where to go and how it goes: goal, path and navigation status."""
 
 from __future__ import annotations
 
@@ -65,45 +65,3 @@ class Path(Message):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))
-
-
-@dataclass(frozen=True, eq=False)
-class OccupancyMap(Message):
-    """Log-odds of occupancy on a horizontal grid.
-
-    Cell (row i, column j) covers x in [x0 + j r, x0 + (j + 1) r) and y in
-    [y0 + i r, y0 + (i + 1) r).  0 is unknown, negative free, positive occupied.
-    """
-
-    n: int = 0
-    """Number of the latest panorama that is part of this map."""
-    version: int = 0
-    time: float = 0.0
-    resolution: float = 0.05
-    """Side of a cell, metres."""
-    origin: tuple[float, float] = (0.0, 0.0)
-    """World (x0, y0) of the corner of cell (0, 0), metres; multiples of the resolution."""
-    log_odds: NDArray[np.int8] = field(default_factory=lambda: np.zeros((1, 1), np.int8))
-    """(rows, columns) int8."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "log_odds", read_only(self.log_odds))
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-        return self.log_odds.shape[0], self.log_odds.shape[1]
-
-    def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Returns (row, column) of a world point; it may lie outside the grid."""
-        return (
-            int(np.floor((y - self.origin[1]) / self.resolution)),
-            int(np.floor((x - self.origin[0]) / self.resolution)),
-        )
-
-    def center(self, row: int, column: int) -> tuple[float, float]:
-        """Returns the world (x, y) of a cell's centre, metres."""
-        return (
-            self.origin[0] + (column + 0.5) * self.resolution,
-            self.origin[1] + (row + 0.5) * self.resolution,
-        )

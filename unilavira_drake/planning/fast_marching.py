@@ -14,13 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from unilavira_drake.kernels import inlined_kernel, kernel
+from unilavira_drake.kernels import frozen_view, inlined_kernel, kernel
 
 MAX_SLOWNESS = 7.0
 """Slowness lies in [1, MAX_SLOWNESS]: one step must stay within the ring of buckets."""
 
 STOP_MARGIN = 4.0
 """An early stop still settles this much beyond the stop cell, in units of the field."""
+
+# Indices of kernels: unsigned, they need no test for counting from the end.
+_U = np.uint64
 
 _BUCKETS = 16
 _PER_CELL = np.float32(2.0)
@@ -53,28 +56,30 @@ def distance_field(
     sources = np.asarray(source_cells, np.int64).reshape(-1, 2)
     if np.any(sources < 0) or np.any(sources >= np.array([rows, columns])):
         raise ValueError(f"source cells must lie in a grid of {rows} x {columns} cells")
-    width = columns + 2
-    padded = np.ones((rows + 2, width), np.bool_)
-    padded[1:-1, 1:-1] = blocked
-    cost = np.ones((rows + 2, width), np.float32)
+    cost = np.ones(1, np.float32)  # One number for all cells.
     if slowness is not None:
         if not (slowness.min() >= 1.0 and slowness.max() <= MAX_SLOWNESS):
             raise ValueError(f"slowness must lie in [1, {MAX_SLOWNESS:g}]")
-        cost[1:-1, 1:-1] = slowness
-    times = np.full((rows + 2, width), np.inf, np.float32)
-    starts = (sources[:, 0] + 1) * width + sources[:, 1] + 1
-    end = -1 if stop is None else (stop[0] + 1) * width + stop[1] + 1
-    _march(padded.ravel(), cost.ravel(), width, starts, times.ravel(), end)
-    return np.ascontiguousarray(times[1:-1, 1:-1])
+        cost = np.broadcast_to(slowness, blocked.shape)
+    times = np.full((rows, columns), np.inf, np.float32)
+    end = -1
+    if stop is not None and 0 <= stop[0] < rows and 0 <= stop[1] < columns:
+        end = int(stop[0]) * columns + int(stop[1])
+    _march(
+        frozen_view(blocked, np.bool_).ravel(),
+        frozen_view(cost, np.float32).ravel(),
+        columns,
+        sources[:, 0] * columns + sources[:, 1],
+        times.ravel(),
+        end,
+    )
+    return times
 
 
 @inlined_kernel
-def _update(times: NDArray[np.float32], i: int, width: int, cost: np.float32) -> Any:
-    """Returns the upwind solution at one cell from its four neighbours."""
-    a = min(times[i - 1], times[i + 1])
-    b = min(times[i - width], times[i + width])
-    if a > b:
-        a, b = b, a
+def _update(x: np.float32, y: np.float32, cost: np.float32) -> Any:
+    """Returns the upwind solution from the lesser neighbour along each of the two axes."""
+    a, b = min(x, y), max(x, y)
     difference = b - a
     if difference >= cost:
         return a + cost
@@ -86,12 +91,12 @@ def _update(times: NDArray[np.float32], i: int, width: int, cost: np.float32) ->
 def _march(
     blocked: NDArray[np.bool_],
     cost: NDArray[np.float32],
-    width: int,
+    columns: int,
     starts: NDArray[np.int64],
     times: NDArray[np.float32],
     end: int,
 ) -> None:
-    """Fills ``times`` of flat grids that are padded with a blocked ring."""
+    """Fills ``times``; the grids are flat, and a cost of one element is that of all cells."""
     queue = np.empty((_BUCKETS, len(starts) + 1024), np.int32)
     count = np.zeros(_BUCKETS, np.int64)
     for start in starts:
@@ -112,48 +117,87 @@ def _march(
         while count[slot] > 0:
             if fullest + 4 > queue.shape[1]:
                 queue = _larger(queue)
-            count[slot] -= 1
-            i = np.int64(queue[slot, count[slot]])
-            # Otherwise its value fell since, and it was taken up under the new one.
-            if np.int64(times[i] * _PER_CELL) == current:
-                fullest = max(
-                    fullest, _relax(blocked, cost, width, times, i, current, queue, count)
-                )
+            fullest = _settle(blocked, cost, columns, times, current, queue, count, fullest)
     if end >= 0:
-        _forget_beyond(times, np.float32(current / _PER_CELL))
+        _forget_beyond(times, np.float32(current / _PER_CELL), queue, count)
 
 
-@inlined_kernel
-def _relax(
+@kernel
+def _settle(
     blocked: NDArray[np.bool_],
     cost: NDArray[np.float32],
-    width: int,
+    columns: int,
     times: NDArray[np.float32],
-    i: Any,
     current: int,
     queue: NDArray[np.int32],
     count: NDArray[np.int64],
+    fullest: int,
 ) -> int:
-    """Updates the four neighbours of a cell, and returns the largest bucket filled."""
-    fullest = 0
-    for step in (-1, 1, -width, width):
-        j = i + step
-        old = times[j]
-        if blocked[j] or old <= times[i]:
+    """Takes up the current bucket till it is empty or one is full; returns the largest size.
+
+    A whole bucket a call: handing arrays to a function costs as much as a cell.
+    """
+    one, row, size, each = _U(1), _U(columns), _U(len(blocked)), _U(len(cost) > 1)
+    slot = _U(current & (_BUCKETS - 1))
+    while count[slot] > 0 and fullest + 4 <= queue.shape[1]:
+        count[slot] -= 1
+        i = _U(queue[slot, _U(count[slot])])
+        time = times[i]
+        # Otherwise its value fell since, and it was taken up under the new one.
+        if np.int64(time * _PER_CELL) != current:
             continue
-        new = _update(times, j, width, cost[j])
-        if new >= old:
-            continue
-        times[j] = new
-        bucket: Any = max(np.int64(new * _PER_CELL), np.int64(current))
-        # Queued under the same bucket already, which is still to come.
-        if bucket != current and old < np.inf and np.int64(old * _PER_CELL) == bucket:
-            continue
-        slot = bucket & (_BUCKETS - 1)
-        queue[slot, count[slot]] = j
-        count[slot] += 1
-        fullest = max(fullest, count[slot])
+        inner = _is_inner(i, row, size)
+        for j in (i - one, i + one, i - row, i + row):
+            if not inner and _is_outside(i, j, row, size):
+                continue
+            old = times[j]
+            if blocked[j] | (old <= time):
+                continue
+            if inner:
+                across = min(times[j - one], times[j + one])
+                along = min(times[j - row], times[j + row])
+            else:
+                across, along = _at_border(times, j, row, size)
+            new = _update(across, along, cost[j * each])
+            if new >= old:
+                continue
+            times[j] = new
+            bucket: Any = max(np.int64(new * _PER_CELL), np.int64(current))
+            # Queued under the same bucket already, which is still to come.
+            if bucket != current and old < np.inf and np.int64(old * _PER_CELL) == bucket:
+                continue
+            into = _U(bucket & (_BUCKETS - 1))
+            queue[into, _U(count[into])] = j
+            count[into] += 1
+            fullest = max(fullest, count[into])
     return fullest
+
+
+@inlined_kernel
+def _is_inner(i: Any, row: Any, size: Any) -> Any:
+    """Returns whether the grid goes on for two cells on all sides of a cell."""
+    two, column = _U(2), i % row
+    rest = row - column
+    return i >= two * row and i + two * row < size and column >= two and rest > two
+
+
+@inlined_kernel
+def _is_outside(i: Any, j: Any, row: Any, size: Any) -> Any:
+    """Returns whether j, the cell beside i or a row away, is none or at a row's other end."""
+    right = max(i, j)
+    wraps = row > _U(1) and right - min(i, j) == _U(1) and right % row == _U(0)
+    return j >= size or wraps
+
+
+@kernel
+def _at_border(times: NDArray[np.float32], j: Any, row: Any, size: Any) -> Any:
+    """Returns the lesser neighbour along each axis; beyond the border it is inf."""
+    one, none, column = _U(1), np.float32(np.inf), j % row
+    left = times[j - one] if column > _U(0) else none
+    right = times[j + one] if column + one < row else none
+    below = times[j - row] if j >= row else none
+    above = times[j + row] if j + row < size else none
+    return min(left, right), min(below, above)
 
 
 @kernel
@@ -165,10 +209,17 @@ def _larger(queue: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 @kernel
-def _forget_beyond(times: NDArray[np.float32], settled: np.float32) -> None:
-    for i in range(times.size):
-        if times[i] > settled:
-            times[i] = np.inf
+def _forget_beyond(
+    times: NDArray[np.float32],
+    settled: np.float32,
+    queue: NDArray[np.int32],
+    count: NDArray[np.int64],
+) -> None:
+    """Clears what lies beyond; all of it is still queued."""
+    for slot in range(_BUCKETS):
+        for k in range(count[slot]):
+            if times[queue[slot, k]] > settled:
+                times[queue[slot, k]] = np.inf
 
 
 def warm_up() -> None:

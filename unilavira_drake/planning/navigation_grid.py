@@ -68,9 +68,9 @@ class NavigationGrid:
 
     def reachable(self, cell: tuple[int, int]) -> NDArray[np.bool_]:
         """Returns the cells that can be reached from a cell over four neighbours."""
-        free = np.logical_not(self.blocked).view(np.uint8)
-        _, labels = cv2.connectedComponents(free, connectivity=4, ltype=cv2.CV_32S)
-        found: NDArray[np.bool_] = (labels == labels[cell]) & (labels != 0)
+        found = np.zeros(self.blocked.shape, np.bool_)
+        if not self.blocked[cell]:
+            _flood(frozen_view(self.blocked, np.bool_), int(cell[0]), int(cell[1]), found)
         return found
 
 
@@ -96,18 +96,16 @@ def make_navigation_grid(
         turning_radius: radius it sweeps when it turns in place, metres.
     """
     log_odds, origin = _window(occupancy, [position, *targets])
-    distance: Any = cv2.distanceTransform(
+    # First the distance in cells between centres; large arrays are filled in place, for every page
+    # of fresh memory costs.
+    clearance: Any = cv2.distanceTransform(
         (log_odds <= 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
     )
-    clearance = np.empty(log_odds.shape, np.float32)
     blocked = np.empty(log_odds.shape, np.bool_)
     slowness = np.empty(log_odds.shape, np.float32)
     comfort = max(turning_radius, radius) + COMFORT
     resolution = occupancy.resolution
-    _fill(
-        frozen_view(log_odds, np.int8), distance, resolution, radius, comfort,
-        clearance, blocked, slowness,
-    )  # fmt: skip
+    _fill(frozen_view(log_odds, np.int8), resolution, radius, comfort, clearance, blocked, slowness)
     grid = NavigationGrid(resolution, origin, log_odds, clearance, blocked, slowness)
     cell = grid.cell(*position)
     if blocked[cell]:
@@ -142,16 +140,15 @@ def _window(
     occupancy: OccupancyMap, points: Sequence[tuple[float, float]]
 ) -> tuple[NDArray[np.int8], tuple[float, float]]:
     """Returns the known cells and the given points with a margin, and the window's corner."""
-    column, row, width, height = cv2.boundingRect((occupancy.log_odds != 0).view(np.uint8))
     cells = [occupancy.cell(x, y) for x, y in points]
-    if width > 0:
-        cells += [(row, column), (row + height - 1, column + width - 1)]
+    top, bottom, left, right = _known(frozen_view(occupancy.log_odds, np.int8))
+    if bottom >= top:
+        cells += [(top, left), (bottom, right)]
     margin = math.ceil(MARGIN / occupancy.resolution)
     i0, i1 = min(c[0] for c in cells) - margin, max(c[0] for c in cells) + margin + 1
     j0, j1 = min(c[1] for c in cells) - margin, max(c[1] for c in cells) + margin + 1
     log_odds = np.zeros((i1 - i0, j1 - j0), np.int8)
-    rows, columns = occupancy.shape
-    inner = occupancy.log_odds[max(i0, 0) : min(i1, rows), max(j0, 0) : min(j1, columns)]
+    inner = occupancy.log_odds[max(i0, 0) : max(i1, 0), max(j0, 0) : max(j1, 0)]
     i, j = max(-i0, 0), max(-j0, 0)
     log_odds[i : i + inner.shape[0], j : j + inner.shape[1]] = inner
     x0, y0 = occupancy.origin
@@ -173,9 +170,97 @@ def _open_way_out(grid: NavigationGrid, cell: tuple[int, int], reach: float) -> 
 
 
 @kernel
+def _known(log_odds: NDArray[np.int8]) -> tuple[int, int, int, int]:
+    """Returns the first and last row and column with a known cell; none is (.., -1, .., -1)."""
+    rows, columns = log_odds.shape
+    top, bottom, left, right = rows, -1, columns, -1
+    for i in range(rows):
+        any_known = np.int8(0)
+        for j in range(columns):
+            any_known |= log_odds[i, j]
+        if any_known == 0:
+            continue
+        top, bottom = min(top, i), i
+        j = 0
+        while j < left and log_odds[i, j] == 0:
+            j += 1
+        left = min(left, j)
+        j = columns - 1
+        while j > right and log_odds[i, j] == 0:
+            j -= 1
+        right = max(right, j)
+    return top, bottom, left, right
+
+
+@kernel
+def _flood(blocked: NDArray[np.bool_], row: int, column: int, found: NDArray[np.bool_]) -> None:
+    """Sets the cells that are connected with a free one: runs of rows, joined where they touch."""
+    rows, columns = blocked.shape
+    runs = np.empty((4 * rows + columns, 3), np.int32)
+    first_of_row = np.zeros(rows + 1, np.int64)
+    n, above, seed = 0, 0, -1
+    for i in range(rows):
+        if n + columns // 2 + 1 > len(runs):
+            longer = np.empty((2 * len(runs) + columns, 3), np.int32)
+            longer[:n] = runs[:n]
+            runs = longer
+        begin = n
+        n = _add_runs(blocked[i], runs, n)
+        for k in range(begin, n):
+            # Runs of the row before that end left of this one touch none that follow, either.
+            while above < begin and runs[above, 1] <= runs[k, 0]:
+                above += 1
+            other = above
+            while other < begin and runs[other, 0] < runs[k, 1]:
+                _join(runs, other, k)
+                other += 1
+            if i == row and runs[k, 0] <= column < runs[k, 1]:
+                seed = k
+        above = begin
+        first_of_row[i + 1] = n
+    root = _root(runs, seed)
+    for i in range(rows):
+        for k in range(first_of_row[i], first_of_row[i + 1]):
+            if _root(runs, k) == root:
+                found[i, runs[k, 0] : runs[k, 1]] = True
+
+
+@kernel
+def _add_runs(blocked: NDArray[np.bool_], runs: NDArray[np.int32], n: int) -> int:
+    """Adds (first, after, itself) of each run of free cells of a row; returns their number."""
+    was_blocked = True
+    for j in range(len(blocked)):
+        if blocked[j] != was_blocked:
+            was_blocked = not was_blocked
+            if was_blocked:
+                runs[n, 1] = j
+                n += 1
+            else:
+                runs[n, 0], runs[n, 2] = j, n
+    if not was_blocked:
+        runs[n, 1] = len(blocked)
+        n += 1
+    return n
+
+
+@kernel
+def _root(runs: NDArray[np.int32], k: int) -> int:
+    """Returns the run that stands for all that are joined with one."""
+    while runs[k, 2] != k:
+        runs[k, 2] = runs[runs[k, 2], 2]
+        k = runs[k, 2]
+    return k
+
+
+@kernel
+def _join(runs: NDArray[np.int32], a: int, b: int) -> None:
+    a, b = _root(runs, a), _root(runs, b)
+    runs[max(a, b), 2] = min(a, b)
+
+
+@kernel
 def _fill(
     log_odds: NDArray[np.int8],
-    distance: NDArray[np.float32],
     resolution: float,
     radius: float,
     comfort: float,
@@ -183,10 +268,11 @@ def _fill(
     blocked: NDArray[np.bool_],
     slowness: NDArray[np.float32],
 ) -> None:
+    """Turns distances in cells into clearance in place, and fills the other two."""
     for i in range(log_odds.shape[0]):
         for j in range(log_odds.shape[1]):
             # From the cell's centre to the border, not the centre, of the obstacle's cell.
-            free = (distance[i, j] - 0.5) * resolution
+            free = (clearance[i, j] - 0.5) * resolution
             clearance[i, j] = free
             blocked[i, j] = free < radius
             share = min(max((comfort - free) / (comfort - radius), 0.0), 1.0)
@@ -221,5 +307,8 @@ def _touches(
 def warm_up() -> None:
     """Compiles the kernels, or loads them from numba's cache."""
     occupancy = OccupancyMap()
-    make_navigation_grid(occupancy, position=(0.0, 0.0), targets=(), radius=0.1, turning_radius=0.1)
+    grid = make_navigation_grid(
+        occupancy, position=(0.0, 0.0), targets=(), radius=0.1, turning_radius=0.1
+    )
+    grid.reachable((0, 0))
     path_is_blocked(occupancy, np.zeros((2, 2)), position=(0.0, 0.0), radius=0.1)

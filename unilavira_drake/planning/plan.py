@@ -14,7 +14,14 @@ from unilavira_drake.planning.navigation_grid import NavigationGrid, make_naviga
 from unilavira_drake.planning.snapping import UNREACHABLE, snap
 
 HORIZON = 30.0
-"""A target outside the map farther than this from the robot is not looked for, metres."""
+"""A target outside the map farther than this from the robot is not looked for, metres; a robot
+outside the map farther than this is lost."""
+
+FARTHEST = 1e12
+"""No place is farther from the world's origin than this, metres: its cell could not be counted."""
+
+NO_PLACE = "goal or pose is not a place"
+LOST = "the robot is outside the map"
 
 
 @dataclass(frozen=True)
@@ -53,7 +60,7 @@ def make_plan(
     goal: tuple[float, float] | None = None,
     parameters: PlanningParameters,
 ) -> Plan:
-    """Returns a plan to the floor nearest to a target.
+    """Returns a plan to the floor nearest to a target, or a plan with the reason why not.
 
     The field is marched from the goal and stops at the robot, so a near goal costs little in a
     large map.
@@ -63,9 +70,14 @@ def make_plan(
         position: (x, y) of the robot, metres.
         target: (x, y) of the selected point, metres.
         viewpoint: (x, y) from which the target was seen, metres.
-        goal: (x, y) of the goal snapped before; kept while the robot can stand and turn there.
+        goal: (x, y) of the goal snapped before; kept while the robot can go, stand and turn there.
         parameters: the robot's size and the bound on snapping.
     """
+    # Not a number is not less, either.
+    if not all(abs(value) < FARTHEST for value in (*position, *target, *viewpoint, *(goal or ()))):
+        return Plan(reason=NO_PLACE)
+    if _is_lost(occupancy, position):
+        return Plan(reason=LOST)
     grid = make_navigation_grid(
         occupancy,
         position=position,
@@ -73,24 +85,38 @@ def make_plan(
         radius=parameters.radius,
         turning_radius=parameters.turning_radius,
     )
-    here = grid.cell(*position)
-    reachable = grid.reachable(here)
-    cell = None if goal is None else _kept(grid, reachable, goal, parameters.turning_radius)
-    if cell is None:
-        snapped = snap(
-            grid,
-            reachable,
-            target=target,
-            position=position,
-            viewpoint=viewpoint,
-            max_distance=parameters.snap_distance,
-            turning_radius=parameters.turning_radius,
-        )
-        if snapped.cell is None:
-            return Plan(reason=snapped.reason)
-        cell = snapped.cell
+    if goal is not None and _is_good(grid, goal, parameters.turning_radius):
+        plan = _way(grid, position, grid.cell(*goal))
+        if not plan.reason:
+            return plan
+    snapped = snap(
+        grid,
+        grid.reachable(grid.cell(*position)),
+        target=target,
+        position=position,
+        viewpoint=viewpoint,
+        max_distance=parameters.snap_distance,
+        turning_radius=parameters.turning_radius,
+    )
+    if snapped.cell is None:
+        return Plan(reason=snapped.reason)
+    return _way(grid, position, snapped.cell)
+
+
+def _is_lost(occupancy: OccupancyMap, position: tuple[float, float]) -> bool:
+    """Returns whether the robot is so far off what is known that no window can hold both."""
+    sides = zip(position, occupancy.origin, occupancy.shape[::-1], strict=True)
+    far = any(
+        not -HORIZON <= place - first <= count * occupancy.resolution + HORIZON
+        for place, first, count in sides
+    )
+    return far and bool(occupancy.log_odds.any())
+
+
+def _way(grid: NavigationGrid, position: tuple[float, float], cell: tuple[int, int]) -> Plan:
+    """Returns the plan to a cell."""
     times = fast_marching.distance_field(
-        grid.blocked, np.array([cell]), slowness=grid.slowness, stop=here
+        grid.blocked, np.array([cell]), slowness=grid.slowness, stop=grid.cell(*position)
     )
     cells = polyline.extract_path(times, grid.blocked, grid.slowness, grid.point(*position))
     if not len(cells):
@@ -99,20 +125,14 @@ def make_plan(
     return Plan(p_WP=p_WP, length=polyline.length(p_WP))
 
 
-def _kept(
-    grid: NavigationGrid,
-    reachable: NDArray[np.bool_],
-    goal: tuple[float, float],
-    turning_radius: float,
-) -> tuple[int, int] | None:
-    """Returns the cell of a goal snapped before, unless the map now shows it to be a bad one."""
+def _is_good(grid: NavigationGrid, goal: tuple[float, float], turning_radius: float) -> bool:
+    """Returns whether the robot can stand and turn at a goal snapped before, as the map is now."""
     cell = grid.cell(*goal)
     if not grid.contains(cell):
-        return None
-    stands = not grid.blocked[cell] and bool(reachable[cell]) and grid.log_odds[cell] < 0
+        return False
     # One cell less than asked at first, so that the noise of a border does not move the goal.
     room = float(grid.clearance[cell]) >= turning_radius - grid.resolution
-    return cell if stands and room else None
+    return room and not grid.blocked[cell] and bool(grid.log_odds[cell] < 0)
 
 
 def warm_up() -> None:

@@ -19,9 +19,10 @@ def grey_levels(occupancy: OccupancyMap) -> NDArray[np.uint8]:
 
     Rows run as in the map, from the least y up.
     """
-    levels = np.full(occupancy.shape, UNKNOWN, np.uint8)
-    levels[occupancy.log_odds < 0] = FREE
-    levels[occupancy.log_odds > 0] = OCCUPIED
+    log_odds = occupancy.log_odds
+    levels = np.full(log_odds.shape, UNKNOWN, np.uint8)
+    levels[log_odds < 0] = FREE
+    levels[log_odds > 0] = OCCUPIED
     return levels
 
 

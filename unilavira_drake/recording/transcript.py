@@ -81,8 +81,9 @@ def _items(value: Any) -> Mapping[str, Any]:
     items = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, OccupancyMap):
         items |= {"shape": value.shape, "image": occupancy_png(value)}
-        # A one-cell map would else show its cell twice.
-        del items["log_odds"]
+        del items["cells"]
+        if not value.rejected:
+            del items["rejected"]
     return {name: item for name, item in items.items() if not _is_large(item)}
 
 

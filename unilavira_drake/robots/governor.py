@@ -102,7 +102,7 @@ class Governor(LeafSystem):
 
     def _allowed_speed(self, context: Context, speed: float, rate: float) -> float:
         """How fast the base may go along the arc of this command, m/s, never negative."""
-        limits = self._limits
+        limits, footprint = self._limits, self._footprint
         map_ = self._map(context)
         X_WB = self._pose(context).GetAsMatrix34()
         if context.get_time() - map_.time > self._map_timeout or not np.isfinite(X_WB).all():
@@ -110,17 +110,21 @@ class Governor(LeafSystem):
         measured = self._twist(context)[3]
         overrun = abs(measured) * self._reaction_time if math.isfinite(measured) else 0.0
         horizon = speed**2 / (2.0 * limits.max_acceleration) + abs(speed) * limits.period + overrun
+        x, y = float(X_WB[0, 3]), float(X_WB[1, 3])
+        size = math.hypot(footprint.half_length + footprint.standoff, footprint.half_width)
+        log_odds, first = map_.around(x, y, size + horizon)
         free = free_distance(
-            map_.log_odds,
+            log_odds,
             map_.origin,
             map_.resolution,
-            X_WB[0, 3],
-            X_WB[1, 3],
+            x,
+            y,
             math.atan2(X_WB[1, 0], X_WB[0, 0]),
             rate / speed,
             speed < 0.0,
             horizon,
-            self._footprint,
+            footprint,
+            first,
         )
         if free >= horizon:
             return abs(speed)

@@ -62,6 +62,7 @@ def free_distance(
     backwards: bool,
     horizon: float,
     footprint: Footprint,
+    first: tuple[int, int] = (0, 0),
 ) -> float:
     """Returns the travel along an arc until the leading edge meets an occupied cell, metres.
 
@@ -79,15 +80,17 @@ def free_distance(
         backwards: whether the base goes backwards.
         horizon: cells farther ahead than this are not looked at, metres.
         footprint: of the base.
+        first: row and column of ``log_odds[0, 0]`` in the map.
 
     Returns:
         ``horizon`` when nothing is met within it.
     """
-    rows, columns = log_odds.shape
+    row_first, column_first = first
+    rows, columns = row_first + log_odds.shape[0], column_first + log_odds.shape[1]
     reach = math.hypot(footprint.half_length + footprint.standoff, footprint.half_width) + horizon
-    row_0 = max(math.floor((y - reach - origin[1]) / resolution), 0)
+    row_0 = max(math.floor((y - reach - origin[1]) / resolution), row_first)
     row_1 = min(math.floor((y + reach - origin[1]) / resolution) + 1, rows)
-    column_0 = max(math.floor((x - reach - origin[0]) / resolution), 0)
+    column_0 = max(math.floor((x - reach - origin[0]) / resolution), column_first)
     column_1 = min(math.floor((x + reach - origin[0]) / resolution) + 1, columns)
     # Going backwards is going forwards with the base seen from behind: x and y change sign.
     sign = -1.0 if backwards else 1.0
@@ -95,7 +98,7 @@ def free_distance(
     best = horizon
     for row in range(row_0, row_1):
         for column in range(column_0, column_1):
-            if log_odds[row, column] > 0:
+            if log_odds[row - row_first, column - column_first] > 0:
                 dx = origin[0] + (column + 0.5) * resolution - x
                 dy = origin[1] + (row + 0.5) * resolution - y
                 px, py = c * dx + s * dy, c * dy - s * dx
@@ -126,5 +129,6 @@ def warm_up() -> None:
         False,
         1.0,
         Footprint(),
+        (0, 0),
     )
     stoppable_speed(1.0, 1.0, 1.0)

@@ -1,0 +1,58 @@
+"""Mapping without an agent: ``OccupancyMapper`` in one's own Diagram, from frontier to frontier."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from pydrake.common.value import AbstractValue
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from unilavira_drake import load_scenario
+from unilavira_drake.mapping.clearance import distance_field, path_clearance
+from unilavira_drake.mapping.frontiers import find_frontiers
+from unilavira_drake.mapping.system import OccupancyMapper
+from unilavira_drake.messages import Panorama
+from unilavira_drake.planning.plan import PlanningParameters, make_plan
+from unilavira_drake.recording.map_layers import draw_occupancy
+from unilavira_drake.sensors.rig import front_intrinsics
+from unilavira_drake.station import make_navigation_station
+
+if __name__ == "__main__":
+    scenario, builder = load_scenario("apartment"), DiagramBuilder()
+    robot, place, stops, looks = scenario.robot, (2.9, 8.2), [], []
+    station = builder.AddSystem(make_navigation_station(scenario))
+    mapper = builder.AddSystem(OccupancyMapper(intrinsics=front_intrinsics(robot), stride=3))
+    for port in ("front.depth_image", "front.X_BC", "pose_estimate"):
+        builder.Connect(station.GetOutputPort(port), mapper.GetInputPort(port))
+    simulator = Simulator(builder.Build())
+    root, plant = simulator.get_mutable_context(), station.GetSubsystemByName("plant")
+    at, there, inside = (s.GetMyMutableContextFromRoot(root) for s in (mapper, station, plant))
+    mapper.GetInputPort("panorama").FixValue(at, AbstractValue.Make(Panorama()))
+    station.GetInputPort("base_command").FixValue(there, np.zeros(3))
+    while place is not None and len(stops) < 25:
+        stops.append(place)  # The robot is put there; it can get there over known free floor.
+        for yaw in np.radians(np.arange(0.0, 360.0, 30.0)):
+            plant.SetPositions(inside, plant.GetModelInstanceByName(robot.name), [*place, yaw])
+            simulator.AdvanceTo(root.get_time() + 0.1)
+        seen = mapper.GetOutputPort("map").Eval(at)
+        found = find_frontiers(seen, position=place, radius=robot.radius + 0.05, min_size=0.5)
+        ends = {f.goal: f for f in found if f.goal}
+        looks.append((seen, ends))
+        gain = [(f.size / (2.0 + np.hypot(*np.subtract(p, place))), p) for p, f in ends.items()]
+        place = max(gain, default=(0.0, None))[1]
+    start = {"position": stops[0], "viewpoint": stops[0], "target": (17.4, 1.2)}
+    way = make_plan(seen, **start, parameters=PlanningParameters(robot.radius)).p_WP
+    figure, axes = plt.subplots(1, 2, figsize=(14, 4.3), layout="constrained")
+    for one, count in zip(axes, (3, len(stops)), strict=True):
+        draw_occupancy(one, looks[count - 1][0])
+        one.plot(*np.transpose(stops[:count]), "o", color="black", mec="white", zorder=4)
+        one.set(xlim=(-0.2, 18.6), ylim=(-0.2, 11.6), aspect="equal", facecolor="0.9")
+        one.set(xticks=[], yticks=[], title=f"after {count} looks around (dots)")
+    for frontier in looks[2][1].values():
+        axes[0].plot(*frontier.p_WF.T, "s", ms=2.5, label=f"{frontier.size:.1f} m")
+    axes[0].legend(title="frontiers", markerscale=3, loc="right")
+    field = np.ma.array(distance_field(seen), mask=seen.log_odds >= 0)
+    shade = axes[1].imshow(field, origin="lower", extent=axes[1].images[0].get_extent(), zorder=2)
+    axes[1].plot(*way.T, color="white", lw=2.5, zorder=3)
+    figure.colorbar(shade, label="distance to the nearest obstacle, m")
+    figure.savefig("apartment_map.png", dpi=120)
+    print(f"{len(stops)} looks; {path_clearance(seen, way, 2.0):.2f} m of room beside the way")
