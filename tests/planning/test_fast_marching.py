@@ -58,8 +58,8 @@ def test_the_field_is_the_upwind_solution(blocked, seed, count):
     for cost in (np.ones_like(slowness), slowness):
         times = distance_field(blocked, sources, slowness=cost)
         expected = oracle(blocked, sources, cost)
-        assert times.dtype == np.float32
-        np.testing.assert_allclose(times, expected, atol=1e-3)
+        assert times.dtype == np.float64
+        np.testing.assert_allclose(times, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -72,7 +72,7 @@ def test_the_field_is_that_of_scikit_fmm(seed):
     times = distance_field(blocked, source[None])
     reached = np.isfinite(times)
     assert reached.sum() > 1000
-    np.testing.assert_allclose(times[reached], expected[reached], atol=1e-3)
+    np.testing.assert_allclose(times[reached], expected[reached], atol=1e-9, rtol=1e-12)
 
 
 def test_a_straight_line_is_exact_and_open_floor_nearly_so():

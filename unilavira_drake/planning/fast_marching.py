@@ -26,7 +26,7 @@ STOP_MARGIN = 4.0
 _U = np.uint64
 
 _BUCKETS = 16
-_PER_CELL = np.float32(2.0)
+_PER_CELL = 2.0
 """Buckets per unit of the field."""
 
 
@@ -36,7 +36,7 @@ def distance_field(
     *,
     slowness: NDArray[np.float32] | None = None,
     stop: tuple[int, int] | None = None,
-) -> NDArray[np.float32]:
+) -> NDArray[np.float64]:
     """Returns the travel time from the nearest source cell to every cell, in cells.
 
     Args:
@@ -47,7 +47,7 @@ def distance_field(
             one, with a small margin, are then left at inf.
 
     Returns:
-        (rows, columns) float32; inf where blocked or unreachable.
+        (rows, columns) float64; inf where blocked or unreachable.
 
     Raises:
         ValueError: if a source lies outside the grid, or the slowness is out of its range.
@@ -61,7 +61,7 @@ def distance_field(
         if not (slowness.min() >= 1.0 and slowness.max() <= MAX_SLOWNESS):
             raise ValueError(f"slowness must lie in [1, {MAX_SLOWNESS:g}]")
         cost = np.broadcast_to(slowness, blocked.shape)
-    times = np.full((rows, columns), np.inf, np.float32)
+    times = np.full((rows, columns), np.inf)
     end = -1
     if stop is not None and 0 <= stop[0] < rows and 0 <= stop[1] < columns:
         end = int(stop[0]) * columns + int(stop[1])
@@ -77,14 +77,14 @@ def distance_field(
 
 
 @inlined_kernel
-def _update(x: np.float32, y: np.float32, cost: np.float32) -> Any:
+def _update(x: float, y: float, cost: float) -> Any:
     """Returns the upwind solution from the lesser neighbour along each of the two axes."""
     a, b = min(x, y), max(x, y)
     difference = b - a
     if difference >= cost:
         return a + cost
-    two_sided = np.float32(2.0) * cost * cost - difference * difference
-    return np.float32(0.5) * (a + b + np.float32(math.sqrt(two_sided)))
+    two_sided = 2.0 * cost * cost - difference * difference
+    return 0.5 * (a + b + math.sqrt(two_sided))
 
 
 @kernel
@@ -93,7 +93,7 @@ def _march(
     cost: NDArray[np.float32],
     columns: int,
     starts: NDArray[np.int64],
-    times: NDArray[np.float32],
+    times: NDArray[np.float64],
     end: int,
 ) -> None:
     """Fills ``times``; the grids are flat, and a cost of one element is that of all cells."""
@@ -119,7 +119,7 @@ def _march(
                 queue = _larger(queue)
             fullest = _settle(blocked, cost, columns, times, current, queue, count, fullest)
     if end >= 0:
-        _forget_beyond(times, np.float32(current / _PER_CELL), queue, count)
+        _forget_beyond(times, current / _PER_CELL, queue, count)
 
 
 @kernel
@@ -127,7 +127,7 @@ def _settle(
     blocked: NDArray[np.bool_],
     cost: NDArray[np.float32],
     columns: int,
-    times: NDArray[np.float32],
+    times: NDArray[np.float64],
     current: int,
     queue: NDArray[np.int32],
     count: NDArray[np.int64],
@@ -158,7 +158,7 @@ def _settle(
                 along = min(times[j - row], times[j + row])
             else:
                 across, along = _at_border(times, j, row, size)
-            new = _update(across, along, cost[j * each])
+            new = _update(across, along, np.float64(cost[j * each]))
             if new >= old:
                 continue
             times[j] = new
@@ -190,9 +190,9 @@ def _is_outside(i: Any, j: Any, row: Any, size: Any) -> Any:
 
 
 @kernel
-def _at_border(times: NDArray[np.float32], j: Any, row: Any, size: Any) -> Any:
+def _at_border(times: NDArray[np.float64], j: Any, row: Any, size: Any) -> Any:
     """Returns the lesser neighbour along each axis; beyond the border it is inf."""
-    one, none, column = _U(1), np.float32(np.inf), j % row
+    one, none, column = _U(1), np.inf, j % row
     left = times[j - one] if column > _U(0) else none
     right = times[j + one] if column + one < row else none
     below = times[j - row] if j >= row else none
@@ -210,8 +210,8 @@ def _larger(queue: NDArray[np.int32]) -> NDArray[np.int32]:
 
 @kernel
 def _forget_beyond(
-    times: NDArray[np.float32],
-    settled: np.float32,
+    times: NDArray[np.float64],
+    settled: float,
     queue: NDArray[np.int32],
     count: NDArray[np.int64],
 ) -> None:

@@ -80,8 +80,8 @@ class GeodesicField(Message):
     """Shortest way over free space from any point to the nearest of the goal cells."""
 
     space: FreeSpace
-    times: NDArray[np.float32]
-    """(rows, columns) float32, distance in cells; inf where unreachable."""
+    times: NDArray[np.float64]
+    """(rows, columns) float64, distance in cells; inf where unreachable."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times", read_only(self.times))

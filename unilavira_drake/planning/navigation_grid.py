@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.kernels import frozen_view, kernel
 from unilavira_drake.messages import OccupancyMap
 from unilavira_drake.planning.fast_marching import MAX_SLOWNESS
+from unilavira_drake.planning.near_obstacles import near_distance
 
 MARGIN = 1.0
 """Unknown floor around the known cells that may be driven through, metres."""
@@ -39,7 +38,8 @@ class NavigationGrid:
     log_odds: NDArray[np.int8]
     """int8; 0 unknown, negative free, positive occupied."""
     clearance: NDArray[np.float32]
-    """float32, metres from a cell's centre to the nearest occupied cell."""
+    """float32, metres from a cell's centre to the nearest occupied cell; inf where none is near
+    enough to matter to this robot."""
     blocked: NDArray[np.bool_]
     """bool: the robot's centre may not be here."""
     slowness: NDArray[np.float32]
@@ -96,15 +96,13 @@ def make_navigation_grid(
         turning_radius: radius it sweeps when it turns in place, metres.
     """
     log_odds, origin = _window(occupancy, [position, *targets])
-    # First the distance in cells between centres; large arrays are filled in place, for every page
-    # of fresh memory costs.
-    clearance: Any = cv2.distanceTransform(
-        (log_odds <= 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-    )
-    blocked = np.empty(log_odds.shape, np.bool_)
-    slowness = np.empty(log_odds.shape, np.float32)
     comfort = max(turning_radius, radius) + COMFORT
     resolution = occupancy.resolution
+    # First the distance in cells between centres; large arrays are filled in place, for every page
+    # of fresh memory costs.
+    clearance = near_distance(log_odds, math.ceil(comfort / resolution + 0.5))
+    blocked = np.empty(log_odds.shape, np.bool_)
+    slowness = np.empty(log_odds.shape, np.float32)
     _fill(frozen_view(log_odds, np.int8), resolution, radius, comfort, clearance, blocked, slowness)
     grid = NavigationGrid(resolution, origin, log_odds, clearance, blocked, slowness)
     cell = grid.cell(*position)

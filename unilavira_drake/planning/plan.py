@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.messages import Message, OccupancyMap
-from unilavira_drake.planning import fast_marching, navigation_grid, polyline, snapping
+from unilavira_drake.planning import (
+    fast_marching,
+    navigation_grid,
+    near_obstacles,
+    polyline,
+    snapping,
+)
 from unilavira_drake.planning.navigation_grid import NavigationGrid, make_navigation_grid
 from unilavira_drake.planning.snapping import UNREACHABLE, snap
 
@@ -137,5 +143,5 @@ def _is_good(grid: NavigationGrid, goal: tuple[float, float], turning_radius: fl
 
 def warm_up() -> None:
     """Compiles every kernel of planning, or loads it from numba's cache."""
-    for module in (fast_marching, navigation_grid, polyline, snapping):
+    for module in (fast_marching, near_obstacles, navigation_grid, polyline, snapping):
         module.warm_up()

@@ -20,7 +20,7 @@ PATIENCE = 24
 
 
 def extract_path(
-    times: NDArray[np.float32],
+    times: NDArray[np.float64],
     blocked: NDArray[np.bool_],
     slowness: NDArray[np.float32],
     start: tuple[float, float],
@@ -31,7 +31,7 @@ def extract_path(
     wherever a line of sight costs no more than the piece it replaces.
 
     Args:
-        times: (rows, columns) float32 field of :func:`distance_field`.
+        times: (rows, columns) float64 field of :func:`distance_field`.
         blocked: (rows, columns) bool, as for the field.
         slowness: (rows, columns) float32, as for the field.
         start: (x, y) in cell coordinates.
@@ -45,10 +45,10 @@ def extract_path(
         return np.zeros((0, 2))
     if not np.isfinite(times[row, column]):
         return np.zeros((0, 2))
-    cells = _descend(frozen_view(times, np.float32), frozen_view(blocked, np.bool_), row, column)
+    cells = _descend(frozen_view(times, np.float64), frozen_view(blocked, np.bool_), row, column)
     return _pull(
         cells,
-        frozen_view(times, np.float32),
+        frozen_view(times, np.float64),
         frozen_view(blocked, np.bool_),
         frozen_view(slowness, np.float32),
         float(start[0]),
@@ -123,7 +123,7 @@ def segment_cost(
 
 @kernel
 def _descend(
-    times: NDArray[np.float32], blocked: NDArray[np.bool_], row: int, column: int
+    times: NDArray[np.float64], blocked: NDArray[np.bool_], row: int, column: int
 ) -> NDArray[np.int64]:
     """Returns the (n, 2) cells of the steepest descent from a cell to a source."""
     rows, columns = times.shape
@@ -155,7 +155,7 @@ def _descend(
 @kernel
 def _pull(
     cells: NDArray[np.int64],
-    times: NDArray[np.float32],
+    times: NDArray[np.float64],
     blocked: NDArray[np.bool_],
     slowness: NDArray[np.float32],
     x: float,
@@ -188,7 +188,7 @@ def _pull(
 def warm_up() -> None:
     """Compiles the kernels, or loads them from numba's cache."""
     free = np.zeros((1, 2), np.bool_)
-    times = np.array([[0.0, 1.0]], np.float32)
+    times = np.array([[0.0, 1.0]])
     points = extract_path(times, free, np.ones((1, 2), np.float32), (1.5, 0.5))
     remaining_length(frozen_view(points, np.float64), 0.0, 0.0)
 
