@@ -7,11 +7,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from unilavira_drake import load_scenario
-from unilavira_drake.mapping.clearance import distance_field, path_clearance
 from unilavira_drake.mapping.frontiers import find_frontiers
 from unilavira_drake.mapping.system import OccupancyMapper
 from unilavira_drake.messages import Panorama
-from unilavira_drake.planning.plan import PlanningParameters, make_plan
+from unilavira_drake.planning.fast_marching import distance_field
+from unilavira_drake.planning.navigation_grid import make_navigation_grid
+from unilavira_drake.planning.polyline import extract_path, length
 from unilavira_drake.recording.map_layers import draw_occupancy
 from unilavira_drake.sensors.rig import front_intrinsics
 from unilavira_drake.station import make_navigation_station
@@ -34,25 +35,26 @@ if __name__ == "__main__":
             plant.SetPositions(inside, plant.GetModelInstanceByName(robot.name), [*place, yaw])
             simulator.AdvanceTo(root.get_time() + 0.1)
         seen = mapper.GetOutputPort("map").Eval(at)
-        found = find_frontiers(seen, position=place, radius=robot.radius + 0.05, min_size=0.5)
-        ends = {f.goal: f for f in found if f.goal}
+        ends = {f.goal: f for f in find_frontiers(seen, position=place, radius=0.4) if f.goal}
         looks.append((seen, ends))
         gain = [(f.size / (2.0 + np.hypot(*np.subtract(p, place))), p) for p, f in ends.items()]
         place = max(gain, default=(0.0, None))[1]
-    start = {"position": stops[0], "viewpoint": stops[0], "target": (17.4, 1.2)}
-    way = make_plan(seen, **start, parameters=PlanningParameters(robot.radius)).p_WP
-    figure, axes = plt.subplots(1, 2, figsize=(14, 4.3), layout="constrained")
+    size = {"radius": robot.radius, "turning_radius": robot.turning_radius}
+    grid, goal = make_navigation_grid(seen, position=stops[0], targets=(), **size), (17.4, 1.2)
+    times = distance_field(grid.blocked, np.array([grid.cell(*goal)]), slowness=grid.slowness)
+    cells = extract_path(times, grid.blocked, grid.slowness, grid.point(*stops[0]))
+    way = cells * grid.resolution + grid.origin
+    figure, axes = plt.subplots(1, 2, figsize=(14, 4.3), layout="tight", subplot_kw={"fc": "0.9"})
     for one, count in zip(axes, (3, len(stops)), strict=True):
         draw_occupancy(one, looks[count - 1][0])
         one.plot(*np.transpose(stops[:count]), "o", color="black", mec="white", zorder=4)
-        one.set(xlim=(-0.2, 18.6), ylim=(-0.2, 11.6), aspect="equal", facecolor="0.9")
-        one.set(xticks=[], yticks=[], title=f"after {count} looks around (dots)")
+        one.set(xlim=(-0.2, 18.6), ylim=(-0.2, 11.6), aspect="equal", title=f"{count} looks around")
     for frontier in looks[2][1].values():
         axes[0].plot(*frontier.p_WF.T, "s", ms=2.5, label=f"{frontier.size:.1f} m")
     axes[0].legend(title="frontiers", markerscale=3, loc="right")
-    field = np.ma.array(distance_field(seen), mask=seen.log_odds >= 0)
-    shade = axes[1].imshow(field, origin="lower", extent=axes[1].images[0].get_extent(), zorder=2)
+    field = np.ma.masked_where(grid.blocked | (grid.log_odds >= 0), times * grid.resolution)
+    x, y = (grid.origin[k] + grid.resolution * np.arange(times.shape[1 - k] + 1) for k in (0, 1))
     axes[1].plot(*way.T, color="white", lw=2.5, zorder=3)
-    figure.colorbar(shade, label="distance to the nearest obstacle, m")
+    figure.colorbar(axes[1].pcolormesh(x, y, field, zorder=2), label="weighted way to the goal, m")
     figure.savefig("apartment_map.png", dpi=120)
-    print(f"{len(stops)} looks; {path_clearance(seen, way, 2.0):.2f} m of room beside the way")
+    print(f"{len(stops)} looks around; a way of {length(way):.1f} m")

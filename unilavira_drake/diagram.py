@@ -19,7 +19,7 @@ from unilavira_drake.navigation import make_navigation
 from unilavira_drake.recording.recorder import Recorder
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.sensors.detections import GroundTruthDetector
-from unilavira_drake.sensors.free_distance import free_distance
+from unilavira_drake.sensors.free_distance import free_distance, warm_up
 from unilavira_drake.sensors.observer import Observer
 from unilavira_drake.sensors.rig import front_intrinsics
 from unilavira_drake.station import make_navigation_station
@@ -60,6 +60,7 @@ def make_navigation_diagram(
         PortTypeError: if a replaced level lacks a port.
     """
     own = dict(replace or {})
+    warm_up()  # The agent takes this function from us; no System of its own compiles it.
     grounder = has_grounder(scenario.grounder, own)
     models = models or make_models(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)

@@ -56,3 +56,9 @@ def braking_speed(distance: float, deceleration: float, period: float) -> float:
     if distance < step * period:
         return distance / period
     return math.sqrt(0.25 * step * step + 2.0 * deceleration * distance) - 0.5 * step
+
+
+def warm_up() -> None:
+    """Compiles the kernels of this module."""
+    approach(0.0, 0.0, 1.0)
+    braking_speed(1.0, 1.0, 1.0)

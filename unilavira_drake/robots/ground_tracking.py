@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from unilavira_drake.kernels import kernel
 from unilavira_drake.messages import read_only
+from unilavira_drake.robots import drive_limits
 from unilavira_drake.robots.drive_limits import DriveLimits, Reaction, approach, braking_speed
 
 MIN_LOOKAHEAD = 0.20
@@ -202,7 +203,8 @@ def track_path(
 
 
 def warm_up() -> None:
-    """Compiles the kernels of this module."""
+    """Compiles the kernels of this module and of the limits."""
+    drive_limits.warm_up()
     limits, reaction = DriveLimits(), Reaction()
     turn_rate(0.0, 0.0, 0.0, reaction, limits)
     p_WP = read_only(np.zeros((2, 2)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from unilavira_drake.kernels import kernel
 from unilavira_drake.messages import read_only
+from unilavira_drake.robots import drive_limits
 
 
 class Footprint(NamedTuple):
@@ -117,7 +118,8 @@ def stoppable_speed(free: float, deceleration: float, period: float) -> float:
 
 
 def warm_up() -> None:
-    """Compiles the kernels of this module."""
+    """Compiles the kernels of this module and of the limits."""
+    drive_limits.warm_up()
     free_distance(
         read_only(np.zeros((1, 1), np.int8)),
         (0.0, 0.0),

@@ -55,7 +55,8 @@ def free_distance(
 
 def warm_up() -> None:
     """Compiles the kernel, so that no control loop waits for the compiler."""
-    free_distance(Frame(), min_height=0.1, max_height=1.4)
+    level = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]], np.float64)
+    free_distance(Frame(X_WC=level), min_height=0.1, max_height=1.4)
 
 
 @kernel
