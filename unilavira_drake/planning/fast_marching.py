@@ -19,9 +19,6 @@ from unilavira_drake.kernels import frozen_view, inlined_kernel, kernel
 MAX_SLOWNESS = 7.0
 """Slowness lies in [1, MAX_SLOWNESS]: one step must stay within the ring of buckets."""
 
-STOP_MARGIN = 4.0
-"""An early stop still settles this much beyond the stop cell, in units of the field."""
-
 # Indices of kernels: unsigned, they need no test for counting from the end.
 _U = np.uint64
 
@@ -44,7 +41,7 @@ def distance_field(
         source_cells: (k, 2) rows and columns; blocked ones are skipped.
         slowness: (rows, columns) float32 in [1, 7]; 1 everywhere when None.
         stop: (row, column) at which the march may end; cells farther from the sources than this
-            one, with a small margin, are then left at inf.
+            one are then left at inf, but for some hardly farther.
 
     Returns:
         (rows, columns) float64; inf where blocked or unreachable.
@@ -112,7 +109,8 @@ def _march(
             empty += 1
             continue
         empty = 0
-        if end >= 0 and current > (times[end] + STOP_MARGIN) * _PER_CELL:
+        # What is taken up from here on cannot lower the value at the stop cell.
+        if end >= 0 and current > times[end] * _PER_CELL:
             break
         while count[slot] > 0:
             if fullest + 4 > queue.shape[1]:
