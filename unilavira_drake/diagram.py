@@ -68,7 +68,12 @@ def make_navigation_diagram(
     intrinsics = front_intrinsics(scenario.robot)
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))
-    wiring.add("station", lambda: make_navigation_station(scenario, world=world, start=start))
+    wiring.add(
+        "station",
+        lambda: make_navigation_station(
+            scenario, world=world, start=start, locomotion=own.pop("locomotion", None)
+        ),
+    )
     wiring.add(
         "observer",
         lambda: Observer(
@@ -128,7 +133,7 @@ def make_navigation_diagram(
         )
         _listen(wiring, todo=scenario.ablation in ("full", "no_scb"), grounder=grounder)
     if own:
-        levels = (*_TOP_LEVELS, *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
+        levels = (*_TOP_LEVELS, "locomotion", *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
         raise ScenarioError(unknown_name("level", next(iter(own)), levels, "replace"))
     return wiring.build("unilavira")
 

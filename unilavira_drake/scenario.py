@@ -23,6 +23,8 @@ from unilavira_drake.mllm.latency import (
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.robots.cobot_magic import CobotMagic
 from unilavira_drake.robots.robot import Robot
+from unilavira_drake.robots.unitree_g1 import UnitreeG1
+from unilavira_drake.robots.unitree_go1 import UnitreeGo1
 
 # What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both; or both with the
 # predecessor's one-step revert in their place.
@@ -31,7 +33,7 @@ RENDERERS = ("vtk", "raster")
 GROUNDERS = ("none", "color", "label")
 
 # The first one is meant where a file writes no tag.
-RobotChoice = CobotMagic
+RobotChoice = CobotMagic | UnitreeGo1 | UnitreeG1
 
 # Likewise.
 LatencyChoice = (
@@ -170,5 +172,5 @@ def register_robot(kind: type[Robot]) -> None:
 
 def robot_kinds() -> dict[str, type[Robot]]:
     """Returns the robots that a scenario may choose, by name."""
-    choice: typing.Any = Scenario.__dataclass_fields__["robot"].type
-    return {kind().name: kind for kind in typing.get_args(choice) or (choice,)}
+    kinds = typing.get_args(Scenario.__dataclass_fields__["robot"].type)
+    return {kind().name: kind for kind in kinds}

@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
 
 from unilavira_drake.errors import ScenarioError
 from unilavira_drake.raster import raster_works
@@ -64,6 +64,7 @@ def make_navigation_station(
     *,
     world: World | None = None,
     start: tuple[float, float, float] | None = None,
+    locomotion: System | None = None,
 ) -> Diagram:
     """Returns the Diagram ``station``: plant, scene graph, cameras and actuation.
 
@@ -90,6 +91,7 @@ def make_navigation_station(
         scenario: what to build.
         world: read from the scenario when None.
         start: x, y (metres) and yaw (radians); the chosen task's start when None.
+        locomotion: a System in the place of the robot's own, see ``add_actuation``.
 
     Raises:
         ScenarioError: if the world's file cannot be used.
@@ -105,7 +107,7 @@ def make_navigation_station(
     plant, scene_graph, model_instance = _add_scene(builder, scenario, world)
     robot = scenario.robot
     set_start(plant, model_instance, robot, start)
-    add_actuation(builder, plant, model_instance, robot)
+    add_actuation(builder, plant, model_instance, robot, locomotion)
     if scenario.renderer == "raster" and raster_works():
         add_raster_cameras(builder, plant, scene_graph, robot, lights(mirrored=world.mirrored))
     else:

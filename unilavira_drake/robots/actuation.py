@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, System
 
 from unilavira_drake.robots.ground_actuation import add_ground_actuation, set_ground_start
 from unilavira_drake.robots.robot import GroundRobot, Robot
@@ -15,6 +15,7 @@ def add_actuation(
     plant: MultibodyPlant,
     model_instance: ModelInstanceIndex,
     robot: Robot,
+    locomotion: System | None = None,
 ) -> None:
     """Adds what turns ``base_command`` into motion, and says where the robot is.
 
@@ -26,12 +27,14 @@ def add_actuation(
         plant: finalized.
         model_instance: of the robot.
         robot: its type chooses the kind of actuation.
+        locomotion: a System of the user's own in the place of ours, with its ports: a gait policy,
+            a whole-body controller.
 
     Raises:
         TypeError: if nothing is known to move such a robot.
     """
     if isinstance(robot, GroundRobot):
-        add_ground_actuation(builder, plant, model_instance, robot)
+        add_ground_actuation(builder, plant, model_instance, robot, locomotion)
     else:
         raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")
 

@@ -1,4 +1,4 @@
-"""Actuation on the ground: a twist in the plane, held and carried out by joint servos."""
+"""Actuation on the ground: a twist in the plane, carried out by the servos of the joints."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from typing import Any
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ZeroOrderHold
+from pydrake.systems.framework import DiagramBuilder, System
 
-from unilavira_drake.robots.planar_base import PlanarBase
+from unilavira_drake.robots.planar_base import BASE_JOINTS, PlanarBase
+from unilavira_drake.robots.planar_pose import PlanarPose
 from unilavira_drake.robots.robot import GroundRobot
-
-BASE_JOINTS = ("base_x", "base_y", "base_yaw")
-"""Joints of the model that move the base in the plane, in their order."""
+from unilavira_drake.robots.walking_base import WalkingBase
 
 
 def add_ground_actuation(
@@ -22,26 +20,32 @@ def add_ground_actuation(
     plant: MultibodyPlant,
     model_instance: ModelInstanceIndex,
     robot: GroundRobot,
+    locomotion: System | None = None,
 ) -> None:
     """Adds the base of a ground robot; see ``add_actuation``."""
-    base = builder.AddSystem(PlanarBase(holonomic=robot.holonomic))
-    builder.Connect(plant.get_state_output_port(model_instance), base.GetInputPort("joint_state"))
+    if robot.gait is None and locomotion is None:
+        locomotion = PlanarBase(holonomic=robot.holonomic)
+    joints = joint_names(plant, model_instance)
+    if locomotion is None:
+        locomotion = WalkingBase(
+            robot=robot,
+            joints=joints,
+            actuated=actuator_names(plant, model_instance),
+            time_step=plant.time_step(),
+        )
+    builder.AddNamedSystem("locomotion", locomotion)
+    state = plant.get_state_output_port(model_instance)
+    builder.Connect(state, locomotion.GetInputPort("joint_state"))
     builder.Connect(
-        base.GetOutputPort("desired_joint_state"),
+        locomotion.GetOutputPort("desired_joint_state"),
         plant.get_desired_state_input_port(model_instance),
     )
-    command = base.GetInputPort("base_command")
-    if robot.command_period > 0.0:
-        hold = builder.AddNamedSystem("command_hold", ZeroOrderHold(robot.command_period, 3))
-        builder.Connect(hold.get_output_port(), command)
-        command = hold.get_input_port()
-    builder.ExportInput(command, "base_command")
-    for port, name in (
-        ("pose_estimate", "pose_estimate"),
-        ("twist", "twist"),
-        ("pose_estimate", "cheat_X_WB"),
-    ):
-        builder.ExportOutput(base.GetOutputPort(port), name)
+    builder.ExportInput(locomotion.GetInputPort("base_command"), "base_command")
+    pose = builder.AddSystem(PlanarPose(joints=joints))
+    builder.Connect(state, pose.GetInputPort("joint_state"))
+    builder.ExportOutput(pose.GetOutputPort("X_WB"), "pose_estimate")
+    builder.ExportOutput(pose.GetOutputPort("X_WB"), "cheat_X_WB")
+    builder.ExportOutput(pose.GetOutputPort("twist"), "twist")
 
 
 def set_ground_start(
@@ -52,3 +56,21 @@ def set_ground_start(
         joint = plant.GetJointByName(name, model_instance)
         position: Any = np.array([value])
         joint.set_default_positions(position)
+
+
+def joint_names(plant: MultibodyPlant, model_instance: ModelInstanceIndex) -> list[str]:
+    """Returns the names of a model's moving joints in the order of its positions.
+
+    Args:
+        plant: finalized.
+        model_instance: whose joints have one coordinate each.
+    """
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices(model_instance)]
+    moving = [joint for joint in joints if joint.num_positions()]
+    return [joint.name() for joint in sorted(moving, key=lambda joint: joint.position_start())]
+
+
+def actuator_names(plant: MultibodyPlant, model_instance: ModelInstanceIndex) -> list[str]:
+    """Returns the names of a model's actuated joints in the order of its actuators."""
+    indices = plant.GetJointActuatorIndices(model_instance)
+    return [plant.get_joint_actuator(index).joint().name() for index in indices]

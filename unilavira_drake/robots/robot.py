@@ -57,7 +57,7 @@ class GroundRobot(Robot):
     max_lateral_speed: float = 0.2
     # The body takes a new command this often and holds it, seconds; 0: at once.
     command_period: float = 0.0
-    # How trunk and legs swing; null: wheels. The model then has the joints of robots/gait.py.
+    # How trunk and legs swing, by the joints that robots/gait.py names; null: wheels.
     gait: Gait | None = None
 
     @property
