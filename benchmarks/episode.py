@@ -39,6 +39,7 @@ from unilavira_drake.recording.recorder import Recorder
 from unilavira_drake.robots.governor import Governor
 from unilavira_drake.robots.ground_controller import GroundTrackingController
 from unilavira_drake.robots.planar_base import PlanarBase
+from unilavira_drake.robots.planar_pose import PlanarPose
 
 CHUNK = 0.5
 """Simulated seconds in which the robot either moved or did not."""
@@ -55,8 +56,8 @@ CALLBACKS = (
     (GroundTrackingController, "_update", "control"),
     (Governor, "_update", "control"),
     (PlanarBase, "_calc_desired", "control"),
-    (PlanarBase, "_calc_pose", "control"),
-    (PlanarBase, "_calc_twist", "control"),
+    (PlanarPose, "_calc_pose", "control"),
+    (PlanarPose, "_calc_twist", "control"),
     (GoalSelector, "_calc_goal", "agent"),
     (Recorder, "_publish", "recording"),
 )

@@ -232,7 +232,7 @@ def test_images_are_rendered_only_when_pulled(monkeypatch):
     assert drawn == []
     rig.read("front.depth_image")
     rig.read("front.depth_image")
-    assert drawn == ["depth_image"]
+    assert drawn == ["front.depth_image"]
 
 
 def test_the_scenario_alone_is_enough():

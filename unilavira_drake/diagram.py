@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Diagram, System
@@ -69,12 +69,18 @@ def make_navigation_diagram(
     intrinsics = front_intrinsics(scenario.robot)
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))
-    wiring.add("station", lambda: make_navigation_station(scenario, world=world, start=start))
+    wiring.add(
+        "station",
+        lambda: make_navigation_station(
+            scenario, world=world, start=start, locomotion=own.pop("locomotion", None)
+        ),
+    )
     wiring.add(
         "observer",
         lambda: Observer(
             intrinsics=intrinsics,
             period=scenario.tick,
+            views=scenario.robot.views,
             sweep_direction=scenario.robot.sweep_direction,
         ),
     )
@@ -121,14 +127,14 @@ def make_navigation_diagram(
             period=scenario.tick, budgets=task.budgets, goal_distance=goal_distance
         ),
     )
-    _close_the_ring(wiring)
+    _close_the_ring(wiring, scenario.robot.views)
     if on_message is not None:
         wiring.add(
             "recorder", lambda: Recorder(on_message, period=scenario.tick, grounder=grounder)
         )
         _listen(wiring, todo=scenario.ablation in ("full", "no_scb"), grounder=grounder)
     if own:
-        levels = (*_TOP_LEVELS, *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
+        levels = (*_TOP_LEVELS, "locomotion", *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
         raise ScenarioError(unknown_name("level", next(iter(own)), levels, "replace"))
     return wiring.build("unilavira")
 
@@ -147,9 +153,10 @@ _AGENT_LEVELS = (
 _NAVIGATION_LEVELS = ("mapper", "planner", "controller", "governor")
 
 
-def _close_the_ring(wiring: Wiring) -> None:
-    for port in ("front.color_image", "front.depth_image", "front.label_image", "front.X_BC"):
-        wiring.connect("station", port, "observer")
+def _close_the_ring(wiring: Wiring, views: Sequence[str]) -> None:
+    for view in views:
+        for port in ("color_image", "depth_image", "label_image", "X_BC"):
+            wiring.connect("station", f"{view}.{port}", "observer")
     wiring.connect("station", "pose_estimate", "observer")
     wiring.connect("station", "twist", "observer")
     wiring.connect("navigation", "navigation_status", "observer")
@@ -162,6 +169,10 @@ def _close_the_ring(wiring: Wiring) -> None:
     wiring.connect("observer", "sweep", "navigation")
     for port in ("front.depth_image", "front.X_BC", "pose_estimate", "twist"):
         wiring.connect("station", port, "navigation")
+    for view in views:
+        if view != "front":
+            wiring.connect_wanted("station", f"{view}.depth_image", "navigation")
+            wiring.connect_wanted("station", f"{view}.X_BC", "navigation")
     wiring.connect("navigation", "base_command", "station")
     wiring.connect("station", "cheat_X_WB", "episode_monitor")
     wiring.connect("station", "contact_results", "episode_monitor")

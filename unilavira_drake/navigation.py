@@ -12,17 +12,17 @@ from unilavira_drake.mapping.system import OccupancyMapper
 from unilavira_drake.messages import Intrinsics
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.planning.system import FastMarchingPlanner
-from unilavira_drake.robots.cobot_magic import CobotMagic
 from unilavira_drake.robots.drive_limits import DriveLimits, Reaction
 from unilavira_drake.robots.governor import Governor
 from unilavira_drake.robots.ground_controller import GroundTrackingController
+from unilavira_drake.robots.robot import GroundRobot, Robot
 from unilavira_drake.robots.stopping import Footprint
 from unilavira_drake.wiring import Wiring
 
 
 def make_navigation(
     *,
-    robot: CobotMagic,
+    robot: Robot,
     intrinsics: Intrinsics,
     mapping: MappingConfig,
     planning: PlanningConfig,
@@ -30,7 +30,27 @@ def make_navigation(
     time_step: float,
     replace: MutableMapping[str, System] | None = None,
 ) -> Diagram:
-    """Returns the deterministic half of Robot Action (paper III-B.3) for a ground robot."""
+    """Returns the deterministic half of Robot Action (paper III-B.3); the robot's type chooses.
+
+    Raises:
+        TypeError: if nothing is known to steer such a robot.
+    """
+    if isinstance(robot, GroundRobot):
+        return _make_ground_navigation(
+            robot, intrinsics, mapping, planning, tick, time_step, replace
+        )
+    raise TypeError(f"nothing steers a {type(robot).__name__}; derive it from GroundRobot")
+
+
+def _make_ground_navigation(
+    robot: GroundRobot,
+    intrinsics: Intrinsics,
+    mapping: MappingConfig,
+    planning: PlanningConfig,
+    tick: float,
+    time_step: float,
+    replace: MutableMapping[str, System] | None,
+) -> Diagram:
     wiring = Wiring(replace)
     _add_mapper_and_planner(wiring, robot, intrinsics, mapping, planning, tick)
     limits = DriveLimits(
@@ -38,7 +58,7 @@ def make_navigation(
         max_yaw_rate=robot.max_yaw_rate,
         max_acceleration=robot.max_acceleration,
         max_yaw_acceleration=robot.max_yaw_acceleration,
-        period=robot.control_period,
+        period=robot.hold,
     )
     footprint = Footprint(half_length=robot.length / 2, half_width=robot.width / 2)
     # A command reaches the wheels in the plant's next step and shows in the one after.
@@ -74,7 +94,7 @@ def make_navigation(
 
 def _add_mapper_and_planner(
     wiring: Wiring,
-    robot: CobotMagic,
+    robot: Robot,
     intrinsics: Intrinsics,
     mapping: MappingConfig,
     planning: PlanningConfig,

@@ -5,6 +5,7 @@ is an error, and overlays change single values.  Every flag of the command is su
 """
 
 import dataclasses as dc
+import typing
 
 from pydrake.multibody.plant import MultibodyPlantConfig
 
@@ -21,6 +22,9 @@ from unilavira_drake.mllm.latency import (
 )
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.robots.cobot_magic import CobotMagic
+from unilavira_drake.robots.robot import Robot
+from unilavira_drake.robots.unitree_g1 import UnitreeG1
+from unilavira_drake.robots.unitree_go1 import UnitreeGo1
 
 # What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both; or both with the
 # predecessor's one-step revert in their place.
@@ -28,8 +32,10 @@ ABLATIONS = ("full", "no_tdm", "no_scb", "no_both", "lavira")
 RENDERERS = ("vtk", "raster")
 GROUNDERS = ("none", "color", "label")
 
-
 # The first one is meant where a file writes no tag.
+RobotChoice = CobotMagic | UnitreeGo1 | UnitreeG1
+
+# Likewise.
 LatencyChoice = (
     NoLatency
     | ConstantLatency
@@ -110,7 +116,7 @@ class Scenario:
     description: str = ""
     random_seed: int = 0
     world: WorldChoice = dc.field(default_factory=WorldChoice)
-    robot: CobotMagic = dc.field(default_factory=CobotMagic)
+    robot: RobotChoice = dc.field(default_factory=CobotMagic)
     # Where the robot starts unless the task says otherwise: ROOM or X,Y,YAW.
     start: str = ""
     tasks: dict[str, NamedTask] = dc.field(default_factory=dict)
@@ -151,3 +157,20 @@ class Scenario:
             time_step=0.025, discrete_contact_approximation="lagged"
         )
     )
+
+
+def register_robot(kind: type[Robot]) -> None:
+    """Makes a robot of one's own a choice in scenarios; its tag is the name of the class.
+
+    Args:
+        kind: a dataclass whose fields all have defaults.
+    """
+    field = Scenario.__dataclass_fields__["robot"]
+    if kind not in robot_kinds().values():
+        field.type = typing.cast(type, field.type | kind)
+
+
+def robot_kinds() -> dict[str, type[Robot]]:
+    """Returns the robots that a scenario may choose, by name."""
+    kinds = typing.get_args(Scenario.__dataclass_fields__["robot"].type)
+    return {kind().name: kind for kind in kinds}

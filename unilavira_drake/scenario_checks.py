@@ -23,7 +23,7 @@ from unilavira_drake.mllm.latency import (
     recorded_latencies,
 )
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
-from unilavira_drake.scenario import ABLATIONS, GROUNDERS, RENDERERS, Scenario
+from unilavira_drake.scenario import ABLATIONS, GROUNDERS, RENDERERS, Scenario, robot_kinds
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.tasks import FAMILIES, checked_task, success_rule
 from unilavira_drake.worlds.load import load_world
@@ -56,15 +56,15 @@ _RULES: dict[str, _Rule] = {
     "memory.merge_distance": _NOT_NEGATIVE,
     "robot.image_width": _IMAGE_SIDE,
     "robot.image_height": _IMAGE_SIDE,
+    "robot.max_lateral_speed": _NOT_NEGATIVE,
+    "robot.command_period": _NOT_NEGATIVE,
+    "robot.gait.heave": _NOT_NEGATIVE,
+    "robot.gait.roll_degrees": _NOT_NEGATIVE,
+    "robot.gait.pitch_degrees": _NOT_NEGATIVE,
+    "robot.gait.swing_degrees": _NOT_NEGATIVE,
     "robot.horizontal_fov_degrees": ("between 10 and 150 degrees", lambda v: 10 <= v <= 150),
 }
 """Every other number of a scenario must be positive; Drake checks those of ``plant``."""
-
-
-def robot_names() -> list[str]:
-    """Returns the names of the robots that a scenario may choose."""
-    (robot,) = (field.type for field in dataclasses.fields(Scenario) if field.name == "robot")
-    return sorted(kind().name for kind in typing.get_args(robot) or (robot,))
 
 
 def validate(scenario: Scenario) -> None:
@@ -80,7 +80,7 @@ def validate(scenario: Scenario) -> None:
     _check_name("renderer", "renderer", scenario.renderer, RENDERERS)
     _check_name("grounder", "grounder", scenario.grounder, GROUNDERS)
     _check_name("preset", "prompt_preset", scenario.prompt_preset, sorted(PROMPT_PRESETS))
-    _check_name("robot", "robot.name", scenario.robot.name, robot_names())
+    _check_robot(scenario)
     _check_name(
         "direction", "robot.sweep_direction", scenario.robot.sweep_direction, sorted(SWEEP_ORDERS)
     )
@@ -116,6 +116,21 @@ def _check_number(place: str, value: float) -> None:
 def _check_name(kind: str, place: str, name: str, valid: typing.Sequence[str]) -> None:
     if name not in valid:
         raise ScenarioError(unknown_name(kind, name, valid, place))
+
+
+def _check_robot(scenario: Scenario) -> None:
+    kinds = robot_kinds()
+    robot = scenario.robot
+    _check_name("robot", "robot.name", robot.name, sorted(kinds))
+    if not isinstance(robot, kinds[robot.name]):
+        raise ScenarioError(
+            f"robot.name: {robot.name!r} is another robot than !{type(robot).__name__}; "
+            f"choose it by its tag, robot: !{kinds[robot.name].__name__} {{}}."
+        )
+    if "front" not in robot.views or len(set(robot.views)) < len(robot.views):
+        raise ScenarioError(
+            f"robot.views: {robot.views} is not usable; name each camera once, front among them."
+        )
 
 
 def _check_model(scenario: Scenario, role: str) -> None:
@@ -176,6 +191,7 @@ def _check_periods(scenario: Scenario) -> None:
     for place, period in (
         ("tick", scenario.tick),
         ("robot.control_period", scenario.robot.control_period),
+        ("robot.command_period", getattr(scenario.robot, "command_period", 0.0) or step),
     ):
         steps = period / step
         if steps < 0.5 or abs(steps - round(steps)) > 1e-6:

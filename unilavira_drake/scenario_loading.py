@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_data, yaml_load_typed
 
 from unilavira_drake.errors import ScenarioError, unknown_name
 from unilavira_drake.resources import models_path
-from unilavira_drake.scenario import Scenario
+from unilavira_drake.robots.cobot_magic import CobotMagic
+from unilavira_drake.scenario import Scenario, robot_kinds
 from unilavira_drake.scenario_checks import validate
 from unilavira_drake.scenario_schema import Source, check_fields
 
@@ -39,7 +41,7 @@ def load_scenario(name_or_file: str | Path, overlay: str = "") -> Scenario:
         raise ScenarioError(f"{path}: cannot be read: {error}.") from None
     scenario = _merged(text, str(path), Scenario())
     if overlay.strip():
-        scenario = _merged(overlay, "overlay", scenario)
+        scenario = _merged(_with_robot(overlay, scenario), "overlay", scenario)
     validate(scenario)
     scenario.name = scenario.name or path.stem
     return scenario
@@ -49,6 +51,18 @@ def dump_scenario(scenario: Scenario) -> str:
     """Returns the scenario, complete, as YAML that :func:`load_scenario` reads back."""
     text: str = yaml_dump_typed(scenario)
     return text
+
+
+def robot_setting(name: str) -> str:
+    """Returns what chooses a robot by its name, as the YAML value of ``robot``.
+
+    Raises:
+        ScenarioError: names the nearest robot if there is none of this name.
+    """
+    kinds = robot_kinds()
+    if name not in kinds:
+        raise ScenarioError(unknown_name("robot", name, kinds, "robot"))
+    return f"!{kinds[name].__name__} {{}}"
 
 
 def overlay_from_settings(settings: list[str]) -> str:
@@ -65,6 +79,9 @@ def overlay_from_settings(settings: list[str]) -> str:
         level = root
         for depth, key in enumerate(keys[:-1]):
             below = level.setdefault(key, {})
+            if isinstance(below, yaml.MappingNode) and below.tag.startswith("!"):
+                # A choice, whose values may follow.
+                below = level[key] = _Tagged(below)
             if not isinstance(below, dict):
                 dotted = ".".join(keys[: depth + 1])
                 raise ScenarioError(
@@ -100,7 +117,16 @@ def _node(value: yaml.Node | dict) -> yaml.Node:  # type: ignore[type-arg]
         (yaml.ScalarNode("tag:yaml.org,2002:str", key), _node(below))
         for key, below in value.items()
     ]
-    return yaml.MappingNode("tag:yaml.org,2002:map", pairs)
+    tag = value.tag if isinstance(value, _Tagged) else "tag:yaml.org,2002:map"
+    return yaml.MappingNode(tag, pairs)
+
+
+class _Tagged(dict[str, Any]):
+    """The keys below a tag."""
+
+    def __init__(self, node: yaml.MappingNode) -> None:
+        super().__init__((key.value, value) for key, value in node.value)
+        self.tag = node.tag
 
 
 def _find(name_or_file: str) -> Path:
@@ -142,6 +168,21 @@ def _merged(text: str, name: str, defaults: Scenario) -> Scenario:
         # Whatever the schema check lets pass and Drake still refuses is the text's fault too.
         raise ScenarioError(f"{name}: {_first_line(error)}.") from error
     return merged
+
+
+def _with_robot(overlay: str, scenario: Scenario) -> str:
+    """Returns the overlay with the tag of the file's robot, where it changes that one's values."""
+    try:
+        root = yaml.compose(overlay, Loader=yaml.SafeLoader)
+    except (yaml.YAMLError, RecursionError):
+        return overlay
+    if isinstance(scenario.robot, CobotMagic) or not isinstance(root, yaml.MappingNode):
+        return overlay  # No tag means that one.
+    for key, value in root.value:
+        if key.value == "robot" and value.tag == "tag:yaml.org,2002:map":
+            value.tag = f"!{type(scenario.robot).__name__}"
+            return yaml.serialize(root, Dumper=yaml.SafeDumper)
+    return overlay
 
 
 def _first_line(error: BaseException) -> str:

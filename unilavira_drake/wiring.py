@@ -44,6 +44,11 @@ class Wiring:
         """
         self._builder.Connect(self._output(source, port), self._input(target, target_port or port))
 
+    def connect_wanted(self, source: str, port: str, target: str) -> None:
+        """Connects ports of one name where the target has such an input port."""
+        if self._levels[target].HasInputPort(port):
+            self.connect(source, port, target)
+
     def take_input(self, name: str, *levels: str) -> None:
         """Makes an input port of the Diagram that feeds the port of that name of each level."""
         for level in levels:

@@ -49,7 +49,7 @@ def test_the_station_falls_back_with_the_same_ports(without_moderngl):
     with pytest.warns(RasterFallbackWarning):
         station = make_navigation_station(scenario)
     assert station.HasOutputPort("front.depth_image")
-    assert station.GetSubsystemByName("front_camera").GetSystemType().endswith("SceneCamera")
+    assert station.GetSubsystemByName("cameras").GetSystemType().endswith("SceneCamera")
 
 
 def test_the_preflight_draws_with_either():

@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from unilavira_drake.diagram import make_navigation_diagram
-from unilavira_drake.scenario_checks import robot_names
+from unilavira_drake.scenario import robot_kinds
 from unilavira_drake.scenario_loading import load_scenario, scenario_names
 from unilavira_drake.worlds.furniture_library import furniture_licences, furniture_models
 from unilavira_drake.worlds.load import load_world
@@ -46,7 +46,7 @@ def scenarios(
         for task_name, task in scenario.tasks.items():
             chosen = " (default)" if task_name == scenario.default_task else ""
             console.print(f"  @{task_name}{chosen} [{task.family}] {task.text}", markup=False)
-    console.print(f"robots: {', '.join(robot_names())}", markup=False)
+    console.print(f"robots: {', '.join(sorted(robot_kinds()))}", markup=False)
 
 
 def _furniture() -> None:

@@ -20,7 +20,7 @@ from unilavira_drake.mllm.judges import make_judge
 from unilavira_drake.recording.run_folder import fresh_folder
 from unilavira_drake.rendering_check import check_rendering
 from unilavira_drake.scenario import Scenario
-from unilavira_drake.scenario_loading import load_scenario, overlay_from_settings
+from unilavira_drake.scenario_loading import load_scenario, overlay_from_settings, robot_setting
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.tasks import checked_task
 
@@ -79,7 +79,6 @@ def run(
         "task.text": task,
         "task.goal": goal,
         "task.start": start,
-        "robot.name": robot,
         "language_model": language_model or model,
         "vision_model": vision_model or model,
         "ablation": ablation,
@@ -92,7 +91,8 @@ def run(
     if task is not None:
         # A saved scenario's goal and start belong to the task that it was saved with.
         flags["task.goal"], flags["task.start"] = goal or "", start or ""
-    loaded = load_scenario(scenario, _overlay(flags, setting or []))
+    choice = [] if robot is None else [f"robot={robot_setting(robot)}"]
+    loaded = load_scenario(scenario, _overlay(flags, [*choice, *(setting or [])]))
     check_rendering(renderer=loaded.renderer)
     if out is not None:
         run_watched(loaded, out)

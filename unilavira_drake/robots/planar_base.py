@@ -1,4 +1,4 @@
-"""A base that moves in the plane: body twist in, desired joint velocities and pose out."""
+"""A base that moves in the plane: body twist in, desired joint velocities out."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import math
 from typing import Any
 
 import numpy as np
-from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, LeafSystem
 
 from unilavira_drake.ports import vector_input
+
+BASE_JOINTS = ("base_x", "base_y", "base_yaw")
+"""Joints of a model that move its base in the plane, in their order."""
 
 
 class PlanarBase(LeafSystem):
@@ -26,12 +28,9 @@ class PlanarBase(LeafSystem):
         - joint_state
         output_ports:
         - desired_joint_state
-        - pose_estimate
-        - twist
 
     ``base_command`` is [vx, vy, wz] in the body frame B, m/s and rad/s; ``joint_state`` and
-    ``desired_joint_state`` are [x, y, yaw, x', y', yaw'] in the world W; ``pose_estimate`` is
-    X_WB, ``twist`` is [w; v] of B in W, expressed in B.
+    ``desired_joint_state`` are [x, y, yaw, x', y', yaw'] in the world W.
 
     Args:
         holonomic: whether ``vy`` is obeyed.
@@ -43,17 +42,7 @@ class PlanarBase(LeafSystem):
         self._holonomic = holonomic
         self._command = vector_input(self, "base_command", 3)
         self._joint_state = vector_input(self, "joint_state", 6)
-        state_ticket = {self.input_port_ticket(self.GetInputPort("joint_state").get_index())}
         self.DeclareVectorOutputPort("desired_joint_state", BasicVector(6), self._calc_desired)
-        self.DeclareAbstractOutputPort(
-            "pose_estimate",
-            lambda: AbstractValue.Make(RigidTransform()),
-            self._calc_pose,
-            prerequisites_of_calc=state_ticket,
-        )
-        self.DeclareVectorOutputPort(
-            "twist", BasicVector(6), self._calc_twist, prerequisites_of_calc=state_ticket
-        )
 
     def _calc_desired(self, context: Any, output: Any) -> None:
         vx, vy, wz = self._command(context).tolist()
@@ -62,15 +51,6 @@ class PlanarBase(LeafSystem):
             vy = 0.0
         c, s = math.cos(yaw), math.sin(yaw)
         output.SetFromVector([0.0, 0.0, 0.0, c * vx - s * vy, s * vx + c * vy, wz])
-
-    def _calc_pose(self, context: Any, output: Any) -> None:
-        x, y, yaw = self._joint_state(context)[:3]
-        output.set_value(planar_pose(float(x), float(y), float(yaw)))
-
-    def _calc_twist(self, context: Any, output: Any) -> None:
-        _, _, yaw, vx, vy, wz = self._joint_state(context).tolist()
-        c, s = math.cos(yaw), math.sin(yaw)
-        output.SetFromVector([0.0, 0.0, wz, c * vx + s * vy, c * vy - s * vx, 0.0])
 
 
 def planar_pose(x: float, y: float, yaw: float) -> RigidTransform:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.framework import Context
+from pydrake.systems.framework import Context, LeafSystem
 from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I, ImageRgba8U
 
 from unilavira_drake.messages import (
@@ -42,8 +43,12 @@ class ObserverState(Message):
     panorama: Panorama = Panorama()
     sweep: Sweep = Sweep()
     outcome: Outcome = Outcome()
+    capturing: int = 0
+    """Number of the panorama that is being captured; 0: none is."""
     heading: float = 0.0
     """World yaw of ``front`` in the running sweep."""
+    stop: int = 0
+    """Headings at which the sweep has captured so far."""
     frames: tuple[Frame, ...] = ()
     since: float = 0.0
     """When the robot began to turn to the view that is captured next."""
@@ -52,7 +57,11 @@ class ObserverState(Message):
 
 
 class Observer(Level):
-    """Captures the four views by turning in place, one panorama for each language call.
+    """Captures the views, one panorama for each language call.
+
+    A robot with one camera turns in place for the four views, at rest.  A ring of cameras sees
+    them at once, after turning to the demanded heading when there is one.  Views beyond the four,
+    like ``down``, are captured once, with the last.
 
     Panorama n + 1 is made when navigation status n is terminal; it carries that status as its
     outcome.  A robot that has not moved since the last panorama (< 5 cm, < 3 degrees) gets the
@@ -62,10 +71,10 @@ class Observer(Level):
 
         name: Observer
         input_ports:
-        - front.color_image
-        - front.depth_image
-        - front.label_image
-        - front.X_BC
+        - (view).color_image
+        - (view).depth_image
+        - (view).label_image
+        - (view).X_BC
         - pose_estimate
         - twist
         - navigation_status
@@ -74,8 +83,9 @@ class Observer(Level):
         - sweep
 
     Args:
-        intrinsics: of the front camera.
+        intrinsics: of every camera.
         period: polling period, seconds.
+        views: the cameras, ``front`` among them; with ``left`` they are a ring.
         sweep_direction: ``left`` or ``right``, the side to which the robot turns to look around.
         heading_tolerance: a view is captured within this error of its heading, radians ...
         rest_rate: ... and below this yaw rate (rad/s) and speed (m/s) ...
@@ -88,6 +98,7 @@ class Observer(Level):
         *,
         intrinsics: Intrinsics,
         period: float,
+        views: Sequence[str] = ("front",),
         sweep_direction: str = "left",
         heading_tolerance: float = 0.02,
         rest_rate: float = 0.03,
@@ -95,14 +106,21 @@ class Observer(Level):
     ) -> None:
         super().__init__(ObserverState(), period=period)
         self._intrinsics = intrinsics
-        self._order = SWEEP_ORDERS[sweep_direction]
+        ring = tuple(view for view in SWEEP_ORDERS["left"] if view in views)
+        extra = tuple(view for view in views if view not in VIEW_YAW)
+        # What is captured at each heading, as (view, its camera).
+        self._stops: tuple[tuple[tuple[str, str], ...], ...]
+        if len(ring) > 1:
+            self._stops = (tuple((view, view) for view in ring + extra),)
+        else:
+            turns = SWEEP_ORDERS[sweep_direction]
+            self._stops = tuple(((view, "front"),) for view in turns[:-1])
+            last = ((turns[-1], "front"), *((view, view) for view in extra))
+            self._stops = (*self._stops, last)
         self._heading_tolerance = heading_tolerance
         self._rest_rate = rest_rate
         self._view_deadline = view_deadline
-        self._color = image_input(self, "front.color_image", ImageRgba8U)
-        self._depth = image_input(self, "front.depth_image", ImageDepth32F)
-        self._label = image_input(self, "front.label_image", ImageLabel16I)
-        self._X_BC = pose_input(self, "front.X_BC")
+        self._cameras = {view: _CameraPorts(self, view) for view in (*ring, *extra)}
         self._pose = pose_input(self, "pose_estimate")
         self._twist = vector_input(self, "twist", 6)
         self._status = message_input(self, "navigation_status", NavigationStatus())
@@ -111,7 +129,7 @@ class Observer(Level):
 
     def step(self, context: Context, state: ObserverState) -> ObserverState:
         """Starts a sweep when a goal is done, captures the views, publishes the panorama."""
-        if state.sweep.active:
+        if state.capturing:
             return self._capture(context, state)
         status = self._status(context)
         if status.n != state.panorama.n or not status.terminal:
@@ -129,11 +147,15 @@ class Observer(Level):
         if state.panorama.n > 0 and _at_rest_place(state, X_WB, yaw, status.heading):
             panorama = dataclasses.replace(state.panorama, n=n, outcome=outcome)
             return dataclasses.replace(state, panorama=panorama)
+        # A ring that faces anywhere need not turn.
+        turns = len(self._stops) > 1 or status.heading is not None
         return dataclasses.replace(
             state,
-            sweep=Sweep(n=n, active=True, heading=heading),
+            capturing=n,
+            sweep=Sweep(n=n, active=turns, heading=heading),
             outcome=outcome,
             heading=heading,
+            stop=0,
             frames=(),
             since=context.get_time(),
         )
@@ -144,38 +166,58 @@ class Observer(Level):
         twist = self._twist(context)
         time = context.get_time()
         at_rest = abs(twist[2]) < self._rest_rate and np.hypot(*twist[3:5]) < self._rest_rate
-        on_heading = (
-            abs(math.remainder(yaw - state.sweep.heading, 2 * math.pi)) < self._heading_tolerance
-        )
+        error = abs(math.remainder(yaw - state.sweep.heading, 2 * math.pi))
+        on_heading = error < self._heading_tolerance or not state.sweep.active
         if not (at_rest and on_heading) and time - state.since < self._view_deadline:
             return state
-        view = self._order[len(state.frames)]
-        frames = (*state.frames, self._frame(context, view, X_WB, time))
-        if len(frames) < len(self._order):
-            heading = state.heading + VIEW_YAW[self._order[len(frames)]]
+        new = tuple(
+            self._frame(context, view, camera, X_WB, time)
+            for view, camera in self._stops[state.stop]
+        )
+        frames, stop = (*state.frames, *new), state.stop + 1
+        if stop < len(self._stops):
+            heading = state.heading + VIEW_YAW[self._stops[stop][0][0]]
             sweep = dataclasses.replace(state.sweep, heading=heading)
-            return dataclasses.replace(state, frames=frames, sweep=sweep, since=time)
-        front = _at_yaw(X_WB, state.heading)
-        n = state.sweep.n
+            return dataclasses.replace(state, frames=frames, stop=stop, sweep=sweep, since=time)
+        n = state.capturing
         panorama = Panorama(
-            n=n, first=n, time=time, X_WB=front, frames=frames, outcome=state.outcome
+            n=n,
+            first=n,
+            time=time,
+            # Views of a ring turn with the base, those of a sweep count from where it began.
+            X_WB=_at_yaw(X_WB, state.heading if len(self._stops) > 1 else yaw),
+            frames=frames,
+            outcome=state.outcome,
         )
         return dataclasses.replace(
-            state, panorama=panorama, sweep=Sweep(n=n), frames=(), rest_yaw=yaw
+            state, capturing=0, panorama=panorama, sweep=Sweep(n=n), frames=(), rest_yaw=yaw
         )
 
-    def _frame(self, context: Context, view: str, X_WB: NDArray[np.float64], time: float) -> Frame:
-        color = rgb_of(pixels(self._color(context)))
+    def _frame(
+        self, context: Context, view: str, camera: str, X_WB: NDArray[np.float64], time: float
+    ) -> Frame:
+        ports = self._cameras[camera]
+        color = rgb_of(pixels(ports.color(context)))
         return Frame(
             view=view,
             time=time,
             color=color,
-            depth=read_only(pixels(self._depth(context))[:, :, 0]),
-            label=read_only(pixels(self._label(context))[:, :, 0]),
+            depth=read_only(pixels(ports.depth(context))[:, :, 0]),
+            label=read_only(pixels(ports.label(context))[:, :, 0]),
             jpeg=encode_jpeg(color),
             intrinsics=self._intrinsics,
-            X_WC=X_WB @ pose_matrix(self._X_BC(context)),
+            X_WC=X_WB @ pose_matrix(ports.X_BC(context)),
         )
+
+
+class _CameraPorts:
+    """The input ports of one camera."""
+
+    def __init__(self, observer: LeafSystem, view: str) -> None:
+        self.color = image_input(observer, f"{view}.color_image", ImageRgba8U)
+        self.depth = image_input(observer, f"{view}.depth_image", ImageDepth32F)
+        self.label = image_input(observer, f"{view}.label_image", ImageLabel16I)
+        self.X_BC = pose_input(observer, f"{view}.X_BC")
 
 
 def _at_rest_place(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from pydrake.geometry import (
@@ -20,18 +20,24 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
 from unilavira_drake.messages import Intrinsics
-from unilavira_drake.raster import RasterCameraConfig, RasterView, add_raster_camera, suns_of
+from unilavira_drake.raster import (
+    RasterCamera,
+    RasterCameraConfig,
+    RasterView,
+    add_raster_camera,
+    suns_of,
+)
 
 RENDERER = "vtk"
 """Name of the render engine in the scene graph."""
 
 
 class CameraModel(Protocol):
-    """A robot's front camera: image size in pixels and field of view in degrees."""
+    """A robot's cameras, all alike: image size in pixels and field of view in degrees."""
 
     image_width: int
     image_height: int
@@ -39,7 +45,7 @@ class CameraModel(Protocol):
 
 
 def front_intrinsics(robot: CameraModel) -> Intrinsics:
-    """Returns the intrinsics of a robot's front camera."""
+    """Returns the intrinsics of a robot's front camera, and of every other one that it has."""
     return pinhole(robot.image_width, robot.image_height, robot.horizontal_fov_degrees)
 
 
@@ -67,14 +73,11 @@ def add_rgbd_camera(
     intrinsics: Intrinsics,
     min_depth: float,
     max_depth: float,
-) -> tuple[RgbdSensor, RigidTransform]:
+) -> RgbdSensor:
     """Adds a camera at a named frame of the plant (x right, y down, z forward).
 
     Colour, depth and label share one pinhole.  Depth is float32 metres along z: 0 nearer than
     ``min_depth``, inf beyond ``max_depth``.
-
-    Returns:
-        The sensor, and X_BC, the camera's pose in the body that carries it.
     """
     body_frame, X_BC = _mount(plant, frame_name)
     core = _core(intrinsics, min_depth, max_depth)
@@ -88,7 +91,8 @@ def add_rgbd_camera(
         ),
     )
     builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
-    return sensor, X_BC
+    added: RgbdSensor = sensor
+    return added
 
 
 def add_raster_rgbd_camera(
@@ -96,36 +100,40 @@ def add_raster_rgbd_camera(
     plant: MultibodyPlant,
     scene_graph: SceneGraph,
     *,
-    frame_name: str,
+    name: str,
+    frame_names: Mapping[str, str],
     intrinsics: Intrinsics,
     min_depth: float,
     max_depth: float,
     lights: Sequence[LightParameter],
-) -> tuple[Any, RigidTransform]:
-    """Adds the camera of ``add_rgbd_camera`` as a raster camera, which needs no renderer.
+) -> RasterCamera | Diagram:
+    """Adds cameras like ``add_rgbd_camera`` as a raster camera, which needs no renderer.
 
     Args:
         builder: as there, like what is not named here.
         plant: finalized.
         scene_graph: what it sees.
-        frame_name: of the camera.
-        intrinsics: of the camera.
+        name: of the new System.
+        frame_names: camera frame of each view; a single view's ports have no prefix.
+        intrinsics: of each view.
         min_depth: metres.
         max_depth: metres.
         lights: directional lights in the world.
-
-    Returns:
-        The camera, and X_BC, its pose in the body that carries it.
     """
-    body_frame, X_BC = _mount(plant, frame_name)
-    view = RasterView(
-        body_frame,
-        X_BC,
-        _core(intrinsics, min_depth, max_depth),
-        DepthRange(min_depth, max_depth),
-    )
-    config = RasterCameraConfig((view,), light=suns_of(lights), fallback_lights=tuple(lights))
-    return add_raster_camera(builder, scene_graph, config, frame_name), X_BC
+    views = []
+    for view, frame_name in frame_names.items():
+        body_frame, X_BC = _mount(plant, frame_name)
+        views.append(
+            RasterView(
+                body_frame,
+                X_BC,
+                _core(intrinsics, min_depth, max_depth),
+                DepthRange(min_depth, max_depth),
+                name=view if len(frame_names) > 1 else "",
+            )
+        )
+    config = RasterCameraConfig(tuple(views), light=suns_of(lights), fallback_lights=tuple(lights))
+    return add_raster_camera(builder, scene_graph, config, name)
 
 
 def _mount(plant: MultibodyPlant, frame_name: str) -> tuple[FrameId, RigidTransform]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,16 +29,17 @@ class SceneCamera(LeafSystem):
         input_ports:
         - plant_state
         output_ports:
-        - color_image
-        - depth_image
-        - label_image
+        - (view).color_image
+        - (view).depth_image
+        - (view).label_image
 
     Args:
         scene: a Diagram with a subsystem ``plant`` of the same positions as the simulated one,
             and the output ports of this System.
+        views: names of the views.
     """
 
-    def __init__(self, scene: Diagram) -> None:
+    def __init__(self, scene: Diagram, *, views: Sequence[str]) -> None:
         super().__init__()
         self._scene = scene
         plant = scene.GetSubsystemByName("plant")
@@ -49,17 +51,19 @@ class SceneCamera(LeafSystem):
             self, "plant_state", self._plant.num_positions() + self._plant.num_velocities()
         )
         ticket = self.input_port_ticket(self.GetInputPort("plant_state").get_index())
-        for name, image_type in (
-            ("color_image", ImageRgba8U),
-            ("depth_image", ImageDepth32F),
-            ("label_image", ImageLabel16I),
-        ):
-            self.DeclareAbstractOutputPort(
-                name,
-                Value[image_type],
-                functools.partial(self._render, name),
-                prerequisites_of_calc={ticket},
-            )
+        for view in views:
+            for image, image_type in (
+                ("color_image", ImageRgba8U),
+                ("depth_image", ImageDepth32F),
+                ("label_image", ImageLabel16I),
+            ):
+                name = f"{view}.{image}"
+                self.DeclareAbstractOutputPort(
+                    name,
+                    Value[image_type],
+                    functools.partial(self._render, name),
+                    prerequisites_of_calc={ticket},
+                )
 
     def _render(self, name: str, context: Context, output: Any) -> None:
         positions: Any = self._state(context)[: self._plant.num_positions()]

@@ -1,0 +1,62 @@
+"""What moves a robot: one function for each kind of body."""
+
+from __future__ import annotations
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.systems.framework import DiagramBuilder, System
+
+from unilavira_drake.robots.ground_actuation import add_ground_actuation, set_ground_start
+from unilavira_drake.robots.robot import GroundRobot, Robot
+
+
+def add_actuation(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    model_instance: ModelInstanceIndex,
+    robot: Robot,
+    locomotion: System | None = None,
+) -> None:
+    """Adds what turns ``base_command`` into motion, and says where the robot is.
+
+    Exports the input ``base_command`` and the outputs ``pose_estimate``, ``twist`` and
+    ``cheat_X_WB`` of the Diagram that is built.
+
+    Args:
+        builder: of the station.
+        plant: finalized.
+        model_instance: of the robot.
+        robot: its type chooses the kind of actuation.
+        locomotion: a System of the user's own in the place of ours, with its ports: a gait policy,
+            a whole-body controller.
+
+    Raises:
+        TypeError: if nothing is known to move such a robot.
+    """
+    if isinstance(robot, GroundRobot):
+        add_ground_actuation(builder, plant, model_instance, robot, locomotion)
+    else:
+        raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")
+
+
+def set_start(
+    plant: MultibodyPlant,
+    model_instance: ModelInstanceIndex,
+    robot: Robot,
+    start: tuple[float, float, float],
+) -> None:
+    """Sets the default pose of a robot.
+
+    Args:
+        plant: finalized.
+        model_instance: of the robot.
+        robot: its type chooses what is set.
+        start: x, y (metres) and yaw (radians).
+
+    Raises:
+        TypeError: as ``add_actuation``.
+    """
+    if isinstance(robot, GroundRobot):
+        set_ground_start(plant, model_instance, start)
+    else:
+        raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")

@@ -1,0 +1,76 @@
+"""Actuation on the ground: a twist in the plane, carried out by the servos of the joints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.systems.framework import DiagramBuilder, System
+
+from unilavira_drake.robots.planar_base import BASE_JOINTS, PlanarBase
+from unilavira_drake.robots.planar_pose import PlanarPose
+from unilavira_drake.robots.robot import GroundRobot
+from unilavira_drake.robots.walking_base import WalkingBase
+
+
+def add_ground_actuation(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    model_instance: ModelInstanceIndex,
+    robot: GroundRobot,
+    locomotion: System | None = None,
+) -> None:
+    """Adds the base of a ground robot; see ``add_actuation``."""
+    if robot.gait is None and locomotion is None:
+        locomotion = PlanarBase(holonomic=robot.holonomic)
+    joints = joint_names(plant, model_instance)
+    if locomotion is None:
+        locomotion = WalkingBase(
+            robot=robot,
+            joints=joints,
+            actuated=actuator_names(plant, model_instance),
+            time_step=plant.time_step(),
+        )
+    builder.AddNamedSystem("locomotion", locomotion)
+    state = plant.get_state_output_port(model_instance)
+    builder.Connect(state, locomotion.GetInputPort("joint_state"))
+    builder.Connect(
+        locomotion.GetOutputPort("desired_joint_state"),
+        plant.get_desired_state_input_port(model_instance),
+    )
+    builder.ExportInput(locomotion.GetInputPort("base_command"), "base_command")
+    pose = builder.AddSystem(PlanarPose(joints=joints))
+    builder.Connect(state, pose.GetInputPort("joint_state"))
+    builder.ExportOutput(pose.GetOutputPort("X_WB"), "pose_estimate")
+    builder.ExportOutput(pose.GetOutputPort("X_WB"), "cheat_X_WB")
+    builder.ExportOutput(pose.GetOutputPort("twist"), "twist")
+
+
+def set_ground_start(
+    plant: MultibodyPlant, model_instance: ModelInstanceIndex, start: tuple[float, float, float]
+) -> None:
+    """Sets the default x, y (metres) and yaw (radians) of a ground robot."""
+    for name, value in zip(BASE_JOINTS, start, strict=True):
+        joint = plant.GetJointByName(name, model_instance)
+        position: Any = np.array([value])
+        joint.set_default_positions(position)
+
+
+def joint_names(plant: MultibodyPlant, model_instance: ModelInstanceIndex) -> list[str]:
+    """Returns the names of a model's moving joints in the order of its positions.
+
+    Args:
+        plant: finalized.
+        model_instance: whose joints have one coordinate each.
+    """
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices(model_instance)]
+    moving = [joint for joint in joints if joint.num_positions()]
+    return [joint.name() for joint in sorted(moving, key=lambda joint: joint.position_start())]
+
+
+def actuator_names(plant: MultibodyPlant, model_instance: ModelInstanceIndex) -> list[str]:
+    """Returns the names of a model's actuated joints in the order of its actuators."""
+    indices = plant.GetJointActuatorIndices(model_instance)
+    return [plant.get_joint_actuator(index).joint().name() for index in indices]

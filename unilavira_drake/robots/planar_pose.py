@@ -1,0 +1,54 @@
+"""Where a base in the plane is and how it moves, from its joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import BasicVector, LeafSystem
+
+from unilavira_drake.ports import vector_input
+from unilavira_drake.robots.planar_base import BASE_JOINTS, planar_pose
+
+
+class PlanarPose(LeafSystem):
+    """Reads pose and twist of the base out of the state of the joints.
+
+    .. pydrake_system::
+
+        name: PlanarPose
+        input_ports:
+        - joint_state
+        output_ports:
+        - X_WB
+        - twist
+
+    ``joint_state`` is [q; v] of the model; ``X_WB`` is the true pose of the base frame B, level and
+    on the floor; ``twist`` is [w; v] of B in the world W, expressed in B (rad/s, m/s).
+
+    Args:
+        joints: names of the model's joints in the order of the state; one coordinate each.
+    """
+
+    def __init__(self, *, joints: Sequence[str] = BASE_JOINTS) -> None:
+        super().__init__()
+        self.set_name("planar_pose")
+        self._base = [list(joints).index(name) for name in BASE_JOINTS]
+        self._count = len(joints)
+        self._joint_state = vector_input(self, "joint_state", 2 * self._count)
+        self.DeclareAbstractOutputPort("X_WB", Value[RigidTransform], self._calc_pose)
+        self.DeclareVectorOutputPort("twist", BasicVector(6), self._calc_twist)
+
+    def _calc_pose(self, context: Any, output: Any) -> None:
+        state = self._joint_state(context).tolist()
+        output.set_value(planar_pose(*(state[index] for index in self._base)))
+
+    def _calc_twist(self, context: Any, output: Any) -> None:
+        state = self._joint_state(context).tolist()
+        yaw = state[self._base[2]]
+        vx, vy, wz = (state[self._count + index] for index in self._base)
+        c, s = math.cos(yaw), math.sin(yaw)
+        output.SetFromVector([0.0, 0.0, wz, c * vx + s * vy, c * vy - s * vx, 0.0])

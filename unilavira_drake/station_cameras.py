@@ -1,0 +1,121 @@
+"""The station's cameras: one for each view of the robot, drawn by either renderer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pydrake.common.value import AbstractValue
+from pydrake.geometry import LightParameter, SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantValueSource
+
+from unilavira_drake.robots.robot import Robot
+from unilavira_drake.sensors.camera_mounts import CameraMounts
+from unilavira_drake.sensors.rig import (
+    add_raster_rgbd_camera,
+    add_rgbd_camera,
+    front_intrinsics,
+)
+from unilavira_drake.sensors.scene_camera import SceneCamera
+
+IMAGES = ("color_image", "depth_image", "label_image")
+
+
+def camera_frame(view: str) -> str:
+    """Returns the name of a view's frame in the robot's model."""
+    return f"{view}_camera"
+
+
+def add_raster_cameras(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    robot: Robot,
+    lights: Sequence[LightParameter],
+) -> None:
+    """Adds our own cameras, whose pictures depend on positions alone; a clone shares them.
+
+    Front is a camera of its own, whose depth is wanted all the way; the others are one rig, drawn
+    in one call.
+    """
+    others = tuple(view for view in robot.views if view != "front")
+    for name, views in (("front_camera", ("front",)), ("other_cameras", others)):
+        if not views:
+            continue
+        camera = add_raster_rgbd_camera(
+            builder,
+            plant,
+            scene_graph,
+            name=name,
+            frame_names={view: camera_frame(view) for view in views},
+            intrinsics=front_intrinsics(robot),
+            min_depth=robot.min_depth,
+            max_depth=robot.max_depth,
+            lights=lights,
+        )
+        for view in views:
+            prefix = f"{view}." if len(views) > 1 else ""
+            for image in IMAGES:
+                port = "depth_image_32f" if image == "depth_image" else image
+                builder.ExportOutput(camera.GetOutputPort(prefix + port), f"{view}.{image}")
+
+
+def add_scene_cameras(
+    builder: DiagramBuilder, plant: MultibodyPlant, scene: Diagram, robot: Robot
+) -> None:
+    """Adds Drake's cameras, on a scene of its own that serves all clones.
+
+    Args:
+        builder: of the station.
+        plant: the simulated one.
+        scene: what ``add_scene_sensors`` was called for.
+        robot: whose views these are.
+    """
+    camera = builder.AddNamedSystem("cameras", SceneCamera(scene, views=robot.views))
+    builder.Connect(plant.get_state_output_port(), camera.GetInputPort("plant_state"))
+    for view in robot.views:
+        for image in IMAGES:
+            builder.ExportOutput(camera.GetOutputPort(f"{view}.{image}"), f"{view}.{image}")
+
+
+def add_scene_sensors(
+    builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph, robot: Robot
+) -> None:
+    """Adds an ``RgbdSensor`` for each view to a scene that is only rendered."""
+    for view in robot.views:
+        sensor = add_rgbd_camera(
+            builder,
+            plant,
+            scene_graph,
+            frame_name=camera_frame(view),
+            intrinsics=front_intrinsics(robot),
+            min_depth=robot.min_depth,
+            max_depth=robot.max_depth,
+        )
+        builder.ExportOutput(sensor.color_image_output_port(), f"{view}.color_image")
+        builder.ExportOutput(sensor.depth_image_32F_output_port(), f"{view}.depth_image")
+        builder.ExportOutput(sensor.label_image_output_port(), f"{view}.label_image")
+
+
+def add_camera_mounts(
+    builder: DiagramBuilder, plant: MultibodyPlant, base: RigidBody, robot: Robot
+) -> None:
+    """Exports each camera's pose in the base: a constant where nothing sways in between."""
+    swaying = {}
+    for view in robot.views:
+        frame: Any = plant.GetFrameByName(camera_frame(view))
+        if frame.body().index() != base.index():
+            swaying[view] = frame
+            continue
+        X_BC = frame.GetFixedPoseInBodyFrame()
+        mount = ConstantValueSource(AbstractValue.Make(X_BC))
+        builder.AddNamedSystem(f"{view}_mount", mount)
+        builder.ExportOutput(mount.get_output_port(), f"{view}.X_BC")
+    if swaying:
+        mounts = builder.AddSystem(CameraMounts(plant, base, swaying))
+        builder.Connect(plant.get_body_poses_output_port(), mounts.GetInputPort("body_poses"))
+        for view in swaying:
+            builder.ExportOutput(mounts.GetOutputPort(f"{view}.X_BC"), f"{view}.X_BC")
