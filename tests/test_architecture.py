@@ -15,7 +15,7 @@ NAME = PACKAGE.name
 LAYERS = (
     ("errors", "resources", "kernels"),
     ("messages",),
-    ("tasks", "answer_words", "mllm"),
+    ("tasks", "answer_words", "stated_direction", "mllm"),
     ("ports", "planning", "mapping", "language", "memory", "vision", "sensors", "worlds", "raster"),
     ("model_link", "rendering_check", "asking", "endpoint_check", "serving"),
     ("robots",),

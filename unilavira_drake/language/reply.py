@@ -6,13 +6,15 @@ import dataclasses
 
 from unilavira_drake.answer_words import chosen
 from unilavira_drake.errors import ReplyFormatError
-from unilavira_drake.messages import DIRECTIONS, LanguageAction, TodoUpdate
+from unilavira_drake.messages import DIRECTIONS, DOWN, LanguageAction, TodoUpdate
 from unilavira_drake.mllm.reply_forms import (
-    REPLY_MODELS,
     ActionReply,
     AddOp,
     AnswerReply,
     Backtrack,
+    FlightReply,
+    FlightTurn,
+    Fly,
     GoStair,
     PlanReply,
     RemoveOp,
@@ -20,6 +22,7 @@ from unilavira_drake.mllm.reply_forms import (
     Turn,
     UpdateOp,
     VerdictReply,
+    reply_form,
 )
 from unilavira_drake.mllm.reply_model import ReplyModel, bounded, clipped
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
@@ -50,7 +53,10 @@ def parse_language_reply(text: str, request: MllmRequest) -> LanguageAction:
     variables = request.variables
     if not isinstance(variables, LanguageVariables):
         raise TypeError(f"request {request.n} of role {request.role!r} has no language variables")
-    reply, repairs = REPLY_MODELS[request.call].read(text)
+    form = reply_form(request.call, in_flight=variables.in_flight)
+    if form is None:
+        raise TypeError(f"a reply to the call {request.call!r} has no form")
+    reply, repairs = form.read(text)
     action = _action(reply, request, variables)
     return dataclasses.replace(action, repairs=repairs + action.repairs)
 
@@ -64,7 +70,7 @@ def _action(
         return _verdict(reply, request, variables)
     if isinstance(reply, AnswerReply):
         return _answer(reply, request, variables)
-    assert isinstance(reply, ActionReply)
+    assert isinstance(reply, ActionReply | FlightReply)
     return _decision(reply, request, variables)
 
 
@@ -151,16 +157,18 @@ def _evidence(reply: AnswerReply, request: MllmRequest) -> tuple[tuple[str, ...]
 
 
 def _decision(
-    reply: ActionReply, request: MllmRequest, variables: LanguageVariables
+    reply: ActionReply | FlightReply, request: MllmRequest, variables: LanguageVariables
 ) -> LanguageAction:
     updates = tuple(
         _todo_update(op, number, variables) for number, op in enumerate(reply.todo_updates, start=1)
     )
     action = reply.action
-    if isinstance(action, Turn):
+    if isinstance(action, Turn | FlightTurn):
         _check_turn(action, request.call, variables)
     elif isinstance(action, Backtrack):
         _check_backtrack(action, variables)
+    elif isinstance(action, Fly):
+        _check_fly(action, variables)
     elif isinstance(action, GoStair) and not variables.can_climb:
         raise ReplyFormatError(
             "this robot cannot climb; go_stair is not offered, use another tool."
@@ -169,9 +177,12 @@ def _decision(
         n=request.n,
         call=request.call,
         tool=action.tool,
-        direction=action.direction if isinstance(action, Turn) else "",
+        direction=action.direction if isinstance(action, Turn | FlightTurn) else "",
         waypoint=action.waypoint if isinstance(action, Backtrack) else None,
         stair=action.stair if isinstance(action, GoStair) else "",
+        climb=action.climb if isinstance(action, FlightTurn | Fly) else None,
+        bearing=action.bearing if isinstance(action, Fly) else 0.0,
+        distance=action.distance if isinstance(action, Fly) else 0.0,
         todo_updates=updates,
         progress_analysis=clipped(reply.progress_analysis, REASONING_LIMIT),
         reasoning_todo=clipped(reply.reasoning_todo, REASONING_LIMIT),
@@ -180,13 +191,23 @@ def _decision(
     )
 
 
-def _check_turn(action: Turn, call: str, variables: LanguageVariables) -> None:
+def _check_turn(action: Turn | FlightTurn, call: str, variables: LanguageVariables) -> None:
     failed = variables.failed_direction
     if call == "recover" and action.direction == failed:
-        remaining = ", ".join(word for word in DIRECTIONS if word != failed)
+        offered = (*DIRECTIONS, DOWN) if variables.in_flight else DIRECTIONS
+        remaining = ", ".join(word for word in offered if word != failed)
         raise ReplyFormatError(
             f"{failed} is the direction that has just failed from here; choose among {remaining}."
         )
+
+
+def _check_fly(action: Fly, variables: LanguageVariables) -> None:
+    if variables.bearings is None:
+        raise ReplyFormatError(
+            "fly is offered only where nothing could be marked in the last view; use turn."
+        )
+    if not action.distance and not action.climb:
+        raise ReplyFormatError("fly with distance 0 and climb 0 goes nowhere; give one of them.")
 
 
 def _check_backtrack(action: Backtrack, variables: LanguageVariables) -> None:

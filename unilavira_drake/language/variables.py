@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from unilavira_drake.language.bearings import direction_note
 from unilavira_drake.messages import (
-    DIRECTIONS,
     DecisionRecord,
     Edge,
     Frame,
@@ -53,7 +53,7 @@ def language_request(
     ``second_chance`` and ``todo`` are None when SCB and TDM are not wired.  The detector's
     evidence is added only when one is given, that is for a model declared ``ground_truth``.
     Its images are the pictures of the past, oldest first, those of a failed leg that the history
-    no longer shows, and the four views; no picture is sent twice.
+    no longer shows, and the views; no picture is sent twice.
     """
     failed_frames = () if second_chance is None else second_chance.failed_frames
     rejected = last_action.call == "double_check" and last_action.confirmed is False
@@ -62,7 +62,7 @@ def language_request(
         task=task.text,
         views=tuple(
             ViewNote(direction, round(free_distance(panorama.frame(direction)), 2))
-            for direction in DIRECTIONS
+            for direction in panorama.directions
         ),
         last_action=_last_action(last_action, history),
         outcome=panorama.outcome.words if last_action.n else "",
@@ -82,6 +82,10 @@ def language_request(
         view_degrees=round(math.degrees(panorama.frame("front").intrinsics.horizontal_fov)),
         choices=task.choices,
         forgotten=_forgotten(history),
+        in_flight=panorama.in_flight,
+        bearings=direction_note(task.text, last_action, panorama, history)
+        if call in ("decide", "recover")
+        else None,
     )
     return MllmRequest(
         role="language",
@@ -91,11 +95,12 @@ def language_request(
         variables=variables,
         images=_past_images(history, failed_frames, history_detail)
         + tuple(
-            ImagePart(f"{VIEW_LABEL}{d}", panorama.frame(d).jpeg, view_detail) for d in DIRECTIONS
+            ImagePart(f"{VIEW_LABEL}{d}", panorama.frame(d).jpeg, view_detail)
+            for d in panorama.directions
         ),
         evidence=None
         if detector is None
-        else tuple(detector(panorama.frame(direction)) for direction in DIRECTIONS),
+        else tuple(detector(panorama.frame(direction)) for direction in panorama.directions),
     )
 
 
@@ -142,7 +147,7 @@ def _waypoint_note(
     history: History,
     second_chance: SecondChance | None,
 ) -> WaypointNote:
-    x, y, _ = panorama.position
+    x, y, z = panorama.position
     dx, dy = waypoint.position[0] - x, waypoint.position[1] - y
     front = _front(waypoint, panorama, history)
     target, scene = waypoint.caption
@@ -156,6 +161,7 @@ def _waypoint_note(
         tried=tuple(_edge_text(edge, front) for edge in _tried(waypoint, history, second_chance)),
         offered=second_chance is not None and waypoint.id in second_chance.offers,
         picture=next((p.name for p in history.keyframes if p.number == waypoint.picture), ""),
+        height=round(waypoint.position[2] - z, 1) if panorama.in_flight else 0.0,
     )
 
 
@@ -167,7 +173,7 @@ def _tried(waypoint: Waypoint, history: History, second_chance: SecondChance | N
 
 
 def _edge_text(edge: Edge, front: float) -> str:
-    direction = direction_of(edge.bearing - front)
+    direction = direction_of(None if edge.bearing is None else edge.bearing - front)
     if edge.outcome == "returned":
         place = f" after waypoint {edge.to}" if edge.to is not None else ""
         return f"{direction}: given up{place}"

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
+from unilavira_drake.mapping.flight_goals import FlightGoals, flight_goal, flown_goal
 from unilavira_drake.mapping.projection import Projection, project_box, project_point
 from unilavira_drake.messages import (
+    NO_TARGET,
     Frame,
     Goal,
     History,
@@ -27,13 +29,15 @@ def select_goal(
     panorama: Panorama,
     *,
     max_range: float,
+    flight: FlightGoals = FlightGoals(),  # noqa: B008 (frozen)
 ) -> Goal:
     """Returns the goal of a language action, or ``Goal(0)`` while its inputs are incomplete.
 
     ``turn`` goes to what the vision action selected; ``backtrack`` to the waypoint, to face its
     stored heading; ``stay`` and ``double_check`` stay; ``none``, ``go_stair`` and a vision action
     without a selection give no goal, with the reason; ``stop`` gives no goal at all: the ring
-    rests.
+    rests.  In flight, that is with a view straight down, ``turn`` keeps off what was selected as
+    ``flight`` says (``flight_goals``), and ``fly`` goes where its numbers say.
     """
     n = action.n
     if n == 0 or n != panorama.n or action.tool == "stop":
@@ -49,24 +53,33 @@ def select_goal(
         if waypoint is None:
             return Goal(n, "none", reason=f"unknown waypoint {action.waypoint}")
         return Goal(n, "go", p_WG=waypoint.position, heading=waypoint.heading)
+    if action.tool == "fly":
+        return flown_goal(action, panorama, flight)
     if action.tool != "turn":
         return Goal(n, "none", reason=action.reason or "no usable action")
     if vision.n != n:
         return Goal(0)
-    return _selected(n, action, vision, panorama, max_range)
+    return _selected(action, vision, panorama, max_range, flight)
 
 
 def _selected(
-    n: int, action: LanguageAction, vision: VisionAction, panorama: Panorama, max_range: float
+    action: LanguageAction,
+    vision: VisionAction,
+    panorama: Panorama,
+    max_range: float,
+    flight: FlightGoals,
 ) -> Goal:
+    n = action.n
     direction = vision.direction or action.direction
     try:
         frame = panorama.frame(direction)
     except KeyError:
-        return Goal(n, "none", reason=f"no target: there is no view {direction!r}")
+        return Goal(n, "none", reason=f"{NO_TARGET}: there is no view {direction!r}")
     projection = _projected(vision, frame, max_range)
+    if panorama.in_flight:
+        return flight_goal(action, projection, frame, panorama, _middle(vision), flight)
     if projection.p_WG is None:
-        return Goal(n, "none", reason=f"no target: {projection.reason}")
+        return Goal(n, "none", reason=f"{NO_TARGET}: {projection.reason}")
     return Goal(n, "go", p_WG=projection.p_WG, pixel=projection.pixel)
 
 
@@ -90,6 +103,14 @@ def _projected(vision: VisionAction, frame: Frame, max_range: float) -> Projecti
     return Projection(reason=vision.reason or "nothing was selected")
 
 
+def _middle(vision: VisionAction) -> tuple[float, float] | None:
+    """Returns the pixel that stands for a selection without depth."""
+    if vision.box is None:
+        return vision.point
+    u_min, v_min, u_max, v_max = vision.box
+    return (u_min + u_max - 1) / 2, (v_min + v_max - 1) / 2
+
+
 class GoalSelector(LeafSystem):
     """Turns the language action and its vision action into one goal in the world.
 
@@ -107,12 +128,20 @@ class GoalSelector(LeafSystem):
         - goal
 
     Args:
-        max_range: targets beyond this depth are refused, metres.
+        max_range: targets beyond this depth are refused, metres; in flight, approached.
+        flight: how near and how far an aircraft goes; without a view straight down it has no
+            effect.
     """
 
-    def __init__(self, *, max_range: float = 10.0) -> None:
+    def __init__(
+        self,
+        *,
+        max_range: float = 10.0,
+        flight: FlightGoals = FlightGoals(),  # noqa: B008 (frozen)
+    ) -> None:
         super().__init__()
         self._max_range = max_range
+        self._flight = flight
         # Drake invalidates a calculation whenever any level's state is written, ten times a
         # second; the projection is done once for the same four messages.
         self._memo: list[tuple[tuple[Message, ...], Goal]] = []
@@ -137,6 +166,8 @@ class GoalSelector(LeafSystem):
             if all(a is b for a, b in zip(known, inputs, strict=True)):
                 output.set_value(goal)
                 return
-        goal = select_goal(action, vision, history, panorama, max_range=self._max_range)
+        goal = select_goal(
+            action, vision, history, panorama, max_range=self._max_range, flight=self._flight
+        )
         self._memo[:] = [(inputs, goal)]
         output.set_value(goal)

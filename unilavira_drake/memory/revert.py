@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from unilavira_drake.messages import History, SecondChance
 
-_MOVES = ("turn", "go_stair", "backtrack")
+_MOVES = ("turn", "fly", "go_stair", "backtrack")
 
 
 def one_step_revert(history: History) -> SecondChance:

@@ -25,6 +25,7 @@ from unilavira_drake.messages import (
     Panorama,
     SecondChance,
     VisionAction,
+    direction_of,
 )
 from unilavira_drake.ports import Level, image_input, message_input, pixels, pose_input
 from unilavira_drake.sensors.encoding import encode_jpeg, rgb_of
@@ -126,14 +127,14 @@ class WaypointMemory(Level):
             return dataclasses.replace(state, watch=watch)
         state = dataclasses.replace(state, watch=Watch(watch.position, yaw))
         action = self._action(context)
-        if action.n != state.history.n or action.tool != "turn":
+        if action.n != state.history.n or action.tool not in ("turn", "fly"):
             return state
         return with_picture(
             state,
             self._sight(rgb_of(pixels(self._color(context)))),
             n=action.n,
             waypoint=state.history.current,
-            direction=action.direction,
+            direction=action.direction or direction_of(math.radians(action.bearing)),
         )
 
     def _sight(self, color: NDArray[np.uint8]) -> Sight:

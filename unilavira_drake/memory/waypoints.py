@@ -19,6 +19,7 @@ from unilavira_drake.memory.pictures import (
     shown,
 )
 from unilavira_drake.messages import (
+    DOWN,
     VIEW_YAW,
     DecisionRecord,
     Edge,
@@ -129,11 +130,12 @@ def remember(
     else:
         state, current = _place(state, panorama, target, sight, bounds)
     n, waypoints, edges = panorama.n, state.history.waypoints, old.edges
-    if action.tool == "turn":
-        bearing = state.yaw + VIEW_YAW[action.direction]
+    way = _way(state, action)
+    if way is not None:
+        direction, bearing = way
         to = current if panorama.outcome.state == "arrived" and current != old.current else None
         left = current != old.current
-        edges += (Edge(old.current, action.direction, bearing, action.n, outcome, to, left),)
+        edges += (Edge(old.current, direction, bearing, action.n, outcome, to, left),)
     edges, lost = _kept(edges, old, state, bounds.merge_distance)
     edges = tuple(
         dataclasses.replace(e, back=n) if e.waypoint == current and e.left and not e.back else e
@@ -154,6 +156,22 @@ def remember(
         yaw=panorama.yaw,
         watch=Watch(panorama.position[:2], panorama.yaw),
     )
+
+
+def _way(state: WaypointState, action: LanguageAction) -> tuple[str, float | None] | None:
+    """Returns the word and the world bearing of the way that an action took, None if it took none.
+
+    Straight down is a way without a bearing.  A flight straight up is none: no view shows it.
+    """
+    if action.tool == "turn":
+        turned = VIEW_YAW.get(action.direction)
+        return action.direction, None if turned is None else state.yaw + turned
+    if action.tool != "fly":
+        return None
+    if action.distance:
+        turned = math.radians(action.bearing)
+        return direction_of(turned), state.yaw + turned
+    return (DOWN, None) if (action.climb or 0.0) < 0.0 else None
 
 
 def _kept(
@@ -229,7 +247,8 @@ def _second_chance(
         return SecondChance(n, offers, failed)
     # From leaving the place until the robot was back; nothing is kept on a way back.
     leg = tuple(p for p in state.pictures if _on_leg(p, returned))
-    direction = direction_of(returned.bearing - panorama.yaw)
+    bearing = returned.bearing
+    direction = direction_of(None if bearing is None else bearing - panorama.yaw)
     return SecondChance(n, offers, failed, direction, of_failed_leg(leg, window))
 
 

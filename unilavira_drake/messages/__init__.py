@@ -21,6 +21,7 @@ from unilavira_drake.messages.memory import (
 )
 from unilavira_drake.messages.observation import (
     DIRECTIONS,
+    DOWN,
     SWEEP_ORDERS,
     VIEW_YAW,
     Frame,
@@ -33,6 +34,8 @@ from unilavira_drake.messages.observation import (
 from unilavira_drake.messages.occupancy import OccupancyMap
 from unilavira_drake.messages.plans import (
     ALREADY_THERE,
+    NO_TARGET,
+    ON_THE_WAY,
     TERMINAL_STATES,
     Goal,
     NavigationStatus,
@@ -44,6 +47,9 @@ __all__ = [
     "ALREADY_THERE",
     "CALLS",
     "DIRECTIONS",
+    "DOWN",
+    "NO_TARGET",
+    "ON_THE_WAY",
     "SWEEP_ORDERS",
     "TERMINAL_STATES",
     "TOOLS",

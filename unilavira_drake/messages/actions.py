@@ -9,8 +9,9 @@ from unilavira_drake.messages.frozen import Message
 CALLS = ("plan_todo", "decide", "recover", "double_check", "answer")
 """The five calls to the language model."""
 
-TOOLS = ("turn", "backtrack", "go_stair", "double_check", "stay", "stop", "none")
-"""``turn`` to ``double_check`` are the model's (paper Eq. 2).  The ring adds ``stay`` (nothing to
+TOOLS = ("turn", "backtrack", "go_stair", "double_check", "fly", "stay", "stop", "none")
+"""``turn`` to ``double_check`` are the model's (paper Eq. 2), and ``fly`` is where vision could not
+ground a view in flight (direction-constrained module, paper V).  The ring adds ``stay`` (nothing to
 do: a plan, a verdict), ``stop`` (verified: the ring rests) and ``none`` (no usable reply)."""
 
 
@@ -37,6 +38,12 @@ class LanguageAction(Message):
     direction: str = ""
     waypoint: int | None = None
     stair: str = ""
+    climb: float | None = None
+    """In flight: metres by which the robot is to end higher than it is now; None: not said."""
+    bearing: float = 0.0
+    """Of ``fly``: degrees to the left of ``front`` ..."""
+    distance: float = 0.0
+    """... and metres along the ground."""
     todo_updates: tuple[TodoUpdate, ...] = ()
     progress_analysis: str = ""
     reasoning_todo: str = ""
@@ -56,12 +63,23 @@ class LanguageAction(Message):
 
     @property
     def argument(self) -> str:
-        """The tool's argument as text: direction, waypoint number or up/down."""
+        """The tool's argument as text: direction, waypoint number, up/down, or where to fly."""
         if self.tool == "turn":
-            return self.direction
+            return ", ".join(part for part in (self.direction, _climb_words(self.climb)) if part)
+        if self.tool == "fly":
+            side = "left" if self.bearing >= 0 else "right"
+            way = f"{self.distance:.0f} m at {abs(self.bearing):.0f} degrees to the {side}"
+            parts = (way if self.distance else "", _climb_words(self.climb))
+            return ", ".join(part for part in parts if part)
         if self.tool == "backtrack":
             return str(self.waypoint)
         return self.stair if self.tool == "go_stair" else ""
+
+
+def _climb_words(climb: float | None) -> str:
+    if not climb:
+        return ""
+    return f"{abs(climb):.0f} m {'up' if climb > 0 else 'down'}"
 
 
 @dataclass(frozen=True)

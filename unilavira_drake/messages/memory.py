@@ -88,8 +88,8 @@ class Edge(Message):
 
     waypoint: int = 0
     direction: str = ""
-    bearing: float = 0.0
-    """World bearing of the direction, radians."""
+    bearing: float | None = 0.0
+    """World bearing of the direction, radians; None for straight down, which has none."""
     n: int = 0
     """Number of the language action that took it."""
     outcome: str = ""

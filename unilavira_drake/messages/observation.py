@@ -13,6 +13,10 @@ from unilavira_drake.messages.frozen import Message, read_only
 DIRECTIONS = ("front", "left", "right", "back")
 """The four words of the language action, in the order in which they are offered."""
 
+DOWN = "down"
+"""The fifth view of an aircraft (paper V, OpenUAV): straight down, the top of its picture to the
+front.  It has no bearing."""
+
 VIEW_YAW = {"front": 0.0, "left": math.pi / 2, "back": math.pi, "right": -math.pi / 2}
 """Yaw of each view relative to ``front``, radians, counter-clockwise positive."""
 
@@ -23,8 +27,10 @@ SWEEP_ORDERS = {
 """The order in which a robot with one camera captures the views, by the side it turns to."""
 
 
-def direction_of(bearing: float) -> str:
-    """Returns the word nearest to a bearing to the left of ``front``, radians."""
+def direction_of(bearing: float | None) -> str:
+    """Returns the word nearest to a bearing to the left of ``front``, radians; None is ``down``."""
+    if bearing is None:
+        return DOWN
     return min(DIRECTIONS, key=lambda d: abs(math.remainder(bearing - VIEW_YAW[d], 2 * math.pi)))
 
 
@@ -89,7 +95,9 @@ class Outcome(Message):
 
 @dataclass(frozen=True, eq=False)
 class Panorama(Message):
-    """The four views at one place, under the number ``n`` of the language call they serve.
+    """The views at one place, under the number ``n`` of the language call they serve.
+
+    There are four; a panorama with a fifth one, ``down``, is an aircraft's.
 
     ``front`` is the heading at which the sweep started.  ``first`` is the number under which
     the same frames were first published: a robot that has not moved re-issues them.
@@ -115,6 +123,16 @@ class Panorama(Message):
     def yaw(self) -> float:
         """World yaw of ``front``, radians."""
         return math.atan2(self.X_WB[1, 0], self.X_WB[0, 0])
+
+    @property
+    def in_flight(self) -> bool:
+        """Whether it has a view straight down."""
+        return any(frame.view == DOWN for frame in self.frames)
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """The views that a language action may name here, in the order in which they are shown."""
+        return (*DIRECTIONS, DOWN) if self.in_flight else DIRECTIONS
 
     def frame(self, view: str) -> Frame:
         """Returns the frame of a view.

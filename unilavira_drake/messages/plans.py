@@ -12,6 +12,10 @@ from unilavira_drake.messages.frozen import Message, read_only
 TERMINAL_STATES = ("arrived", "failed")
 ALREADY_THERE = "already there"
 """Why an arrival was no drive: the robot stands beside the goal, or as near as it can get."""
+NO_TARGET = "no target"
+"""Begins the reason of a goal that no view gave: nothing was marked, or no place lies behind it."""
+ON_THE_WAY = "on the way"
+"""Why an arrival is not the end: what was marked lies farther on than one move goes."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,11 @@ class Goal(Message):
     pixel: tuple[float, float] | None = None
     """The representative pixel (u, v) of the selection, behind which ``p_WG`` lies; None for a
     goal that no view gave."""
+    p_WT: tuple[float, float, float] | None = None
+    """In flight: the point of the surface that was marked, which the aircraft does not fly into;
+    None where ``p_WG`` is that point, or where it lies beyond the depth camera's range."""
+    partial: bool = False
+    """In flight: whether ``p_WG`` is only as far as one move goes, and the mark lies farther on."""
 
 
 @dataclass(frozen=True)

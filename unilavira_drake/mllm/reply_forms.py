@@ -12,6 +12,12 @@ import pydantic
 
 from unilavira_drake.mllm.reply_model import Mark, Number, ReplyModel, Share, Whole
 
+MAX_FLIGHT = 100.0
+"""Longest way, and highest climb, that a reply may ask for in one move, metres."""
+
+Climb = Annotated[Number, pydantic.Field(ge=-MAX_FLIGHT, le=MAX_FLIGHT)]
+"""Metres to end higher (below zero: lower) than now."""
+
 
 class UpdateOp(ReplyModel):
     """Closes an item with its evidence, or opens it again."""
@@ -53,6 +59,23 @@ class Turn(ReplyModel):
     direction: Literal["front", "left", "right", "back"]
 
 
+class FlightTurn(ReplyModel):
+    """Fly to something in one of the five views, and end higher or lower if ``climb`` says so."""
+
+    tool: Literal["turn"]
+    direction: Literal["front", "left", "right", "back", "down"]
+    climb: Climb | None = None
+
+
+class Fly(ReplyModel):
+    """Fly by numbers, where vision could not ground a view (paper V)."""
+
+    tool: Literal["fly"]
+    bearing: Annotated[Number, pydantic.Field(ge=-180.0, le=180.0)]
+    distance: Annotated[Number, pydantic.Field(ge=0.0, le=MAX_FLIGHT)]
+    climb: Climb
+
+
 class Backtrack(ReplyModel):
     """Drive back to a waypoint (paper III-D)."""
 
@@ -81,6 +104,10 @@ Tool = Annotated[
     Turn | Backtrack | GoStair | DoubleCheck,
     pydantic.Field(discriminator="tool"),
 ]
+FlightTool = Annotated[
+    FlightTurn | Fly | Backtrack | DoubleCheck,
+    pydantic.Field(discriminator="tool"),
+]
 
 
 class PlanReply(ReplyModel):
@@ -98,6 +125,17 @@ class ActionReply(ReplyModel):
     todo_updates: list[TodoOp] = pydantic.Field(default_factory=list)
     reasoning_action: str
     action: Tool
+    scene: str
+
+
+class FlightReply(ReplyModel):
+    """The same in flight."""
+
+    progress_analysis: str
+    reasoning_todo: str = ""
+    todo_updates: list[TodoOp] = pydantic.Field(default_factory=list)
+    reasoning_action: str
+    action: FlightTool
     scene: str
 
 
@@ -147,7 +185,13 @@ REPLY_MODELS: dict[str, type[ReplyModel]] = {
 """Call -> the form of its reply; the call ``free`` has none."""
 
 
-def reply_schema(call: str) -> dict[str, Any] | None:
-    """Returns the JSON schema of the reply to a call, or None where any text will do."""
+def reply_form(call: str, *, in_flight: bool = False) -> type[ReplyModel] | None:
+    """Returns the form of the reply to a call, or None where any text will do."""
     form = REPLY_MODELS.get(call)
+    return FlightReply if in_flight and form is ActionReply else form
+
+
+def reply_schema(call: str, *, in_flight: bool = False) -> dict[str, Any] | None:
+    """Returns the JSON schema of the reply to a call, or None where any text will do."""
+    form = reply_form(call, in_flight=in_flight)
     return None if form is None else form.model_json_schema()

@@ -24,14 +24,16 @@ def request_schema(request: MllmRequest) -> Schema | None:
 
     It holds no references.  Against the form of the call it leaves out what the request does
     not offer: ``go_stair`` for a robot that cannot climb, ``backtrack`` to other waypoints than
-    the offered ones, the direction that has just failed, positions outside of the TODO list,
-    all TODO fields without a list, and answers outside a closed vocabulary.
+    the offered ones, the direction that has just failed, ``fly`` without the direction block,
+    positions outside of the TODO list, all TODO fields without a list, and answers outside a
+    closed vocabulary.
     """
-    schema = copy.deepcopy(_form(request.call))
+    variables = request.variables
+    in_flight = isinstance(variables, LanguageVariables) and variables.in_flight
+    schema = copy.deepcopy(_form(request.call, in_flight))
     if schema is None:
         return None
     properties = schema["properties"]
-    variables = request.variables
     if isinstance(variables, LanguageVariables):
         if request.call == "plan_todo":
             properties["todo"]["minItems"] = 1
@@ -74,8 +76,8 @@ def schema_prompt(schema: Schema) -> str:
 
 
 @functools.cache
-def _form(call: str) -> Schema | None:
-    schema = reply_schema(call)
+def _form(call: str, in_flight: bool) -> Schema | None:
+    schema = reply_schema(call, in_flight=in_flight)
     return None if schema is None else _without_references(schema, schema.get("$defs", {}))
 
 
@@ -124,6 +126,8 @@ def _narrow_tools(union: Schema, call: str, variables: LanguageVariables) -> Non
                 continue
             form["properties"]["waypoint"]["enum"] = offered
         if tool == "go_stair" and not variables.can_climb:
+            continue
+        if tool == "fly" and variables.bearings is None:
             continue
         forms.append(form)
     _keep(union, forms)

@@ -46,6 +46,8 @@ class WaypointNote(Message):
     """Name of the picture of its front view, e.g. ``H3``; empty when no picture shows it."""
     target: str = ""
     """What the robot went there for."""
+    height: float = 0.0
+    """In flight: metres higher than the robot is now."""
 
     @property
     def caption(self) -> str:
@@ -60,6 +62,23 @@ class DecisionNote(Message):
     n: int = 0
     text: str = ""
     """E.g. ``turn left to 'white door': arrived``."""
+
+
+@dataclass(frozen=True)
+class DirectionNote(Message):
+    """The direction-constrained module of the paper (V): what is known where vision failed.
+
+    Nothing of it is the goal that scores the task: a goal direction is
+    told only if the task's own words state one.
+    """
+
+    now: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    """Present pose as seen from the start: metres along the first ``front``, to its left and
+    higher, and yaw in degrees to the left of it."""
+    goal_distance: float | None = None
+    """Metres along the ground to the place that the task's words state; None: they state none."""
+    goal_bearing: float = 0.0
+    """Degrees to the left of the present front."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +113,10 @@ class LanguageVariables(Message):
     """The closed vocabulary of a question's answer; empty when any words will do."""
     forgotten: tuple[int, ...] = ()
     """Numbers of the waypoints that the buffer had no room for any more."""
+    in_flight: bool = False
+    """Whether the robot flies: there is a view straight down."""
+    bearings: DirectionNote | None = None
+    """In flight, where vision could not ground the last view: what to reason on instead."""
 
     @property
     def failed_edges(self) -> tuple[str, ...]:
@@ -121,6 +144,8 @@ class VisionVariables(Message):
     height: int = 480
     box_space: str = "pixels"
     """How this model writes places in a picture, a key of ``boxes.BOX_SPACES``."""
+    in_flight: bool = False
+    """Whether the robot flies."""
 
 
 @dataclass(frozen=True)

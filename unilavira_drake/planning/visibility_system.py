@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import Context
 
-from unilavira_drake.messages import Goal, Message, NavigationStatus, Path, VoxelMap
+from unilavira_drake.messages import (
+    ALREADY_THERE,
+    ON_THE_WAY,
+    Goal,
+    Message,
+    NavigationStatus,
+    Path,
+    VoxelMap,
+)
 from unilavira_drake.planning.polyline import final_heading
 from unilavira_drake.planning.visibility import (
     FlightParameters,
@@ -42,6 +50,10 @@ class VisibilityPlannerState(Message):
     heading: float | None = None
     target: Point = (0.0, 0.0, 0.0)
     """The selected point before snapping, metres."""
+    mark: Point | None = None
+    """The point of the surface that was marked, metres; None where none is known."""
+    reason: str = ""
+    """Why an arrival is not the end of the way."""
     viewpoint: Point = (0.0, 0.0, 0.0)
     """Where the aircraft was when the goal was given, metres."""
     space: FlightSpace = dc.field(default_factory=FlightSpace)
@@ -175,6 +187,8 @@ class VisibilityPlanner(Level):
             path=_no_path(0),
             heading=goal.heading,
             target=goal.p_WG,
+            mark=goal.p_WT,
+            reason=ON_THE_WAY if goal.partial else "",
             viewpoint=position,
             space=state.space,
             progress_time=time,
@@ -203,16 +217,23 @@ class VisibilityPlanner(Level):
             goal=goal,
             parameters=self._parameters,
         )
-        return self._with_plan(state, plan, voxels, time)
+        return self._with_plan(state, plan, voxels, position, time)
 
     def _with_plan(
-        self, state: VisibilityPlannerState, plan: FlightPlan, voxels: VoxelMap, time: float
+        self,
+        state: VisibilityPlannerState,
+        plan: FlightPlan,
+        voxels: VoxelMap,
+        position: Point,
+        time: float,
     ) -> VisibilityPlannerState:
         n = state.status.n
         if plan.reason:
             return _done(state, n, "failed", plan.reason, None)
         if plan.length <= self._tolerance:
-            return _done(state, n, "arrived", "", state.heading)
+            if state.path.n != n:
+                state = dc.replace(state, reason=ALREADY_THERE)
+            return _arrived(state, position, state.heading)
         version = state.path.version + 1 if state.path.n == n else 0
         return dc.replace(
             state,
@@ -233,7 +254,7 @@ class VisibilityPlanner(Level):
         x, y, z = (float(value) for value in state.path.p_WP[-1])
         if math.dist(position, (x, y, z)) <= self._tolerance:
             heading = _arrival(state.path) if state.heading is None else state.heading
-            return _done(state, n, "arrived", "", heading)
+            return _arrived(state, position, heading)
         step = math.dist(position, state.position)
         if step >= PROGRESS:
             state = dc.replace(state, travelled=state.travelled + step, position=position)
@@ -282,6 +303,17 @@ def _arrival(path: Path) -> float | None:
 
 def _no_path(n: int) -> Path:
     return Path(n, p_WP=np.zeros((0, 3)))
+
+
+def _arrived(
+    state: VisibilityPlannerState, position: Point, heading: float | None
+) -> VisibilityPlannerState:
+    """Returns the terminal state of an arrival, with how far the mark still is."""
+    done = _done(state, state.status.n, "arrived", state.reason, heading)
+    if state.mark is None:
+        return done
+    status = dc.replace(done.status, remaining=math.dist(position, state.mark))
+    return dc.replace(done, status=status)
 
 
 def _done(

@@ -120,6 +120,7 @@ class Vision(Level):
                 width=frame.intrinsics.width,
                 height=frame.intrinsics.height,
                 box_space=self._box_space,
+                in_flight=panorama.in_flight,
             ),
             images=(ImagePart(f"{VIEW_LABEL}{direction}", frame.jpeg, "high"),),
             evidence=None if self._detector is None else (self._detector(frame),),

@@ -1,0 +1,58 @@
+"""Where a task's own words say that its goal lies: ``120 m at 30 degrees from you``.
+
+Flight directives of OpenUAV state distance and angle as seen from the start.  Who reads them knows
+nothing of the goal beyond the words.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from unilavira_drake.messages import Message
+
+_NUMBER = r"(\d+(?:\.\d+)?)"
+_DISTANCE = re.compile(rf"\b{_NUMBER} ?(?:m|meters?|metres?)\b")
+_ANGLE = re.compile(
+    rf"(-?){_NUMBER} ?(?:degrees?|deg|°)(?: (?:to|on|from|at) (?:the|your|you))?(?: (left|right))?"
+)
+_PLAIN = {
+    "ahead": 0.0,
+    "in front of you": 0.0,
+    "to your left": 90.0,
+    "to your right": -90.0,
+    "behind you": 180.0,
+}
+_STATES = re.compile(r"\b(?:is|lies|located|stands|away|waits)\b")
+
+
+@dataclass(frozen=True)
+class StatedDirection(Message):
+    """A place as a task tells it, seen from where and as the robot started."""
+
+    distance: float = 0.0
+    """Metres along the ground."""
+    bearing: float = 0.0
+    """Degrees to the left of the first ``front``."""
+
+
+def stated_direction(task: str) -> StatedDirection | None:
+    """Returns the place that a task states by distance and angle, or None where it states none.
+
+    An angle without a side counts to the right, as OpenUAV's yaw does.  An order (``fly 40 m
+    ahead``) states no place.
+    """
+    for sentence in re.split(r"(?<=[.;!?])\s+", task.lower()):
+        distance = _DISTANCE.search(sentence)
+        bearing = _bearing(sentence)
+        if distance is not None and bearing is not None and _STATES.search(sentence):
+            return StatedDirection(float(distance.group(1)), bearing)
+    return None
+
+
+def _bearing(sentence: str) -> float | None:
+    angle = _ANGLE.search(sentence)
+    if angle is not None:
+        sign = 1.0 if angle.group(3) == "left" else -1.0
+        return (-sign if angle.group(1) else sign) * float(angle.group(2))
+    return next((value for words, value in _PLAIN.items() if words in sentence), None)
