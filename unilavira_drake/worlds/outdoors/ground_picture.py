@@ -108,7 +108,8 @@ def _pattern(name: str) -> Image:
     if material.joint:
         shade *= _joints(material)
     image = 255.0 * shade[:, :, None] * np.array(material.color)
-    return np.clip(image + 0.5, 0, 255).astype(np.uint8)
+    pixels: Image = np.clip(image + 0.5, 0, 255).astype(np.uint8)
+    return pixels
 
 
 def _joints(material: GroundMaterial) -> NDArray[np.float64]:
