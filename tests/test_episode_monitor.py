@@ -69,7 +69,7 @@ class Bench:
 
 
 def test_the_path_and_the_least_distance_follow_the_true_pose():
-    bench = Bench(goal_distance=lambda x, y: math.hypot(x - 2.0, y))
+    bench = Bench(goal_distance=lambda x, y, z: math.hypot(x - 2.0, y))
     bench.tick()
     for angle in np.linspace(0.0, math.pi, 101):
         bench.pose(1 - math.cos(angle), math.sin(angle))

@@ -37,7 +37,7 @@ def make_navigation_diagram(
     *,
     replace: Mapping[str, System] | None = None,
     detector: Callable[[Frame], ViewEvidence] | None = None,
-    goal_distance: Callable[[float, float], float] | None = None,
+    goal_distance: Callable[[float, float, float], float] | None = None,
     on_message: Callable[[float, str, str, object], None] | None = None,
     models: ModelPair | None = None,
 ) -> Diagram:
@@ -49,8 +49,8 @@ def make_navigation_diagram(
             ...); each must have the ports of the level whose place it takes.
         detector: what a model declared ``ground_truth`` is told about a frame; by default the
             simulator's labels.
-        goal_distance: geodesic metres from a floor point (x, y) to the goal, for the monitor;
-            None when the episode is not scored.
+        goal_distance: metres from a place (x, y, z) to the goal, for the monitor; None when the
+            episode is not scored.
         on_message: called at every tick with (time, system, event, message) for each message
             on a port; a ``recording.message_log.MessageLog`` passes the new ones on.
         models: the two models, which the caller closes; by default those of the scenario.

@@ -16,13 +16,13 @@ from pydrake.systems.framework import Context, Diagram, System
 
 from unilavira_drake.diagram import make_navigation_diagram
 from unilavira_drake.episode_result import episode_result
+from unilavira_drake.evaluation.air_goal import make_goal
 from unilavira_drake.evaluation.answers import score_answer
 from unilavira_drake.evaluation.goal_area import success_area
 from unilavira_drake.evaluation.judge import RequestListener, judge_episode
 from unilavira_drake.evaluation.scoring import (
     GoalField,
     Score,
-    make_goal_field,
     score,
     shortest_path,
 )
@@ -83,7 +83,7 @@ def run_episode(
     start = parse_start(task.start, world, radius=scenario.robot.turning_radius)
     goal = None
     if task.goal:
-        goal = make_goal_field(task.goal, world, radius=scenario.robot.radius)
+        goal = make_goal(task.goal, world, task.rule, radius=scenario.robot.radius)
     if goal is not None:
         shortest_path(goal, *start[:2])
     tally, trace = Tally(), EpisodeTrace()

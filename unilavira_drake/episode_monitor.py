@@ -83,8 +83,8 @@ class EpisodeMonitor(Level):
     Args:
         period: polling and sampling period, seconds.
         budgets: decisions, simulated time, stall time, and what the models may use.
-        goal_distance: geodesic metres from a floor point (x, y) to the goal; None when the
-            episode is not scored.
+        goal_distance: metres from a place (x, y, z) to the goal; None when the episode is not
+            scored.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class EpisodeMonitor(Level):
         *,
         period: float,
         budgets: Budgets,
-        goal_distance: Callable[[float, float], float] | None = None,
+        goal_distance: Callable[[float, float, float], float] | None = None,
     ) -> None:
         # It writes whenever the robot moved, so it belongs to the plant's moments: see OFFSET.
         super().__init__(MonitorState(), period=period, offset=0.0)
@@ -128,10 +128,10 @@ class EpisodeMonitor(Level):
 
     def _follow_motion(self, context: Context, state: MonitorState, time: float) -> MonitorState:
         X_WB = self._pose(context).GetAsMatrix34()
-        x, y = float(X_WB[0, 3]), float(X_WB[1, 3])
+        x, y, z = (float(value) for value in X_WB[:, 3])
         yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
         metrics = state.metrics
-        step = metrics.distance_from(x, y) if state.started else 0.0
+        step = metrics.distance_from(x, y, z) if state.started else 0.0
         turned = abs(math.remainder(yaw - state.yaw, 2 * math.pi)) >= SMALLEST_TURN
         if state.started and step < SHORTEST_STEP:
             if not turned:
@@ -140,7 +140,7 @@ class EpisodeMonitor(Level):
             return dataclasses.replace(state, metrics=metrics, yaw=yaw)
         distance = nearest = None
         if self._goal_distance is not None:
-            distance = self._goal_distance(x, y)
+            distance = self._goal_distance(x, y, z)
             nearest = min(
                 distance,
                 math.inf if metrics.min_goal_distance is None else metrics.min_goal_distance,
@@ -149,6 +149,7 @@ class EpisodeMonitor(Level):
             metrics,
             x=x,
             y=y,
+            z=z,
             path_length=metrics.path_length + step,
             goal_distance=distance,
             min_goal_distance=nearest,

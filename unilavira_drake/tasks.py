@@ -26,18 +26,25 @@ class SuccessRule(Message):
     ``uni_lavira``: the released code of the paper.  Where these measure to view points, the goal
     gives them as ``X,Y|X,Y|...``; of a thing without any it is the free floor beside it."""
     radius: float = 1.5
-    """Metres of geodesic between the robot and the free floor at the goal."""
+    """Metres of geodesic between the robot and the free floor at the goal, or straight ones."""
     strict: bool = False
     """Whether the distance must be below the radius, not at most the radius."""
     in_room: bool = True
     """Whether the robot must be in the goal's room."""
     seen: bool = True
     """Whether the last panorama must show the goal instance."""
+    straight: bool = False
+    """Whether distances to the goal are straight through the air, in three dimensions, and the
+    shortest way leads over roofs; else both are geodesic over the floor."""
+    to_middle: bool = False
+    """Whether a straight distance is to the middle of a thing, not to the nearest point of it."""
+    unflown: float = 0.0
+    """Metres at the end of the shortest way that SPL does not ask for."""
     by_answer: bool = False
     """Whether a correct answer decides, and the place is only kept beside it."""
 
     def reached(self, distance: float) -> bool:
-        """Returns whether a geodesic distance to the goal, metres, is near enough."""
+        """Returns whether a distance to the goal, metres, is near enough."""
         return distance < self.radius if self.strict else distance <= self.radius
 
 
@@ -66,6 +73,19 @@ class TaskFamily(Message):
 def _radius(protocol: str, radius: float, *, strict: bool, by_answer: bool = False) -> SuccessRule:
     return SuccessRule(
         protocol, radius, strict=strict, in_room=False, seen=False, by_answer=by_answer
+    )
+
+
+def _flight(protocol: str, *, to_middle: bool = False) -> SuccessRule:
+    """OpenUAV's rule: within 20 m, and SPL of a way that is 20 m shorter."""
+    return SuccessRule(
+        protocol,
+        20.0,
+        in_room=False,
+        seen=False,
+        straight=True,
+        to_middle=to_middle,
+        unflown=20.0,
     )
 
 
@@ -105,8 +125,9 @@ FAMILY_TABLE: Mapping[str, TaskFamily] = {
             "aerial_vln",
             "flight directive",
             (
-                SuccessRule(radius=20.0, in_room=False, seen=False),
-                _radius("uni_lavira", 20.0, strict=False),
+                _flight(HOME),
+                # OpenUAV measures to one point.
+                _flight("uni_lavira", to_middle=True),
             ),
             # OpenUAV gives a flight at most 70 waypoints.
             budgets=FamilyBudgets(decisions=70, simulated_time=3600.0),

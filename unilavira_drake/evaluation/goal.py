@@ -39,6 +39,8 @@ class GoalTarget(Message):
     """Render label that has to be seen at the end; None when nothing has to be."""
     point: tuple[float, float] | None = None
     """Metres in the world, for a point."""
+    height: float = 0.0
+    """Of a point, metres; for flights."""
 
     def place(self, world: World) -> tuple[float, float]:
         """Returns the middle of the target on the floor, metres in the world."""
@@ -122,7 +124,7 @@ def _point(text: str, world: World) -> GoalTarget:
             f"goal: {text!r} is outside the world {world.name!r}; give a point inside a room: "
             f"{', '.join(sorted(room.name for room in world.rooms))}."
         )
-    return GoalTarget(text, "point", (room.name,), point=(x, y))
+    return GoalTarget(text, "point", (room.name,), point=(x, y), height=(*numbers, 0.0)[2])
 
 
 def _gaps(target: GoalTarget, world: World, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from unilavira_drake.evaluation.air_goal import AirGoal
 from unilavira_drake.evaluation.free_space import in_rooms
 from unilavira_drake.evaluation.scoring import HOME_RULE, GoalField
 from unilavira_drake.tasks import SuccessRule
@@ -15,8 +16,11 @@ def success_area(goal: GoalField, rule: SuccessRule = HOME_RULE) -> tuple[NDArra
     """Returns the outlines, (k, 2) metres in the world, of the floor on which a stop succeeds.
 
     It is the free floor, of the goal's rooms if the rule asks for them, that is near enough to the
-    goal; that the goal has to be in the last panorama cannot be drawn.
+    goal; that the goal has to be in the last panorama cannot be drawn.  Of a flight it is what lies
+    within the radius at the goal's own height.
     """
+    if isinstance(goal, AirGoal):
+        return goal.outlines(rule.radius)
     outlines: list[NDArray[np.float64]] = []
     for target, field in zip(goal.targets, goal.fields, strict=True):
         space = field.space

@@ -4,7 +4,8 @@ Success: the agent ended by its own verified stop, and the stop keeps the task's
 ``tasks.SuccessRule``: near enough to the free floor at the goal by geodesic distance and, where the
 rule says so, in the goal's room and with the goal instance in its last panorama.
 SPL = success * l / max(l, p) with the shortest way l and the way gone p (Anderson et al., "On
-Evaluation of Embodied Navigation Agents", 2018).
+Evaluation of Embodied Navigation Agents", 2018).  Of a flight l is 20 m less than the shortest way,
+for the last 20 m need not be flown (OpenUAV).
 """
 
 from __future__ import annotations
@@ -43,13 +44,25 @@ class GoalField(Message):
         """Middle of each alternative, metres in the world; for pictures."""
         return tuple(target.place(self.world) for target in self.targets)
 
-    def distances(self, x: float, y: float) -> tuple[float, ...]:
+    def distances(self, x: float, y: float, z: float = 0.0) -> tuple[float, ...]:
         """Returns the geodesic distance to each alternative, metres; inf where there is no way."""
         return tuple(path_distance(field, x, y) for field in self.fields)
 
-    def distance(self, x: float, y: float) -> float:
+    def distance(self, x: float, y: float, z: float = 0.0) -> float:
         """Returns the distance to the nearest alternative, metres: a few percent long, and fast."""
         return min(quick_distance(field, x, y) for field in self.fields)
+
+    def way_from(self, x: float, y: float, z: float = 0.0) -> float:
+        """Returns the length of the shortest way from a start, metres; see ``shortest_path``."""
+        space = self.fields[0].space
+        beside = (-space.resolution, 0.0, space.resolution)
+        # A start up to one cell beside free floor is free: the border of the grid is that coarse.
+        if not any(space.is_free(x + dx, y + dy) for dx in beside for dy in beside):
+            raise TaskError(
+                f"start: {x:.2f},{y:.2f} is inside an obstacle, too near to one, or shut in; "
+                "choose a start on free floor."
+            )
+        return min(self.distances(x, y, z))
 
 
 @dataclass(frozen=True)
@@ -88,27 +101,19 @@ def make_goal_field(
     return GoalField(world, targets, fields)
 
 
-def shortest_path(goal: GoalField, x: float, y: float) -> float:
-    """Returns the geodesic distance from a start, metres.
+def shortest_path(goal: GoalField, x: float, y: float, z: float = 0.0) -> float:
+    """Returns the length of the shortest way from a start to the goal, metres.
 
     Raises:
         TaskError: if the start is inside an obstacle or cut off from every alternative.
     """
-    space = goal.fields[0].space
-    beside = (-space.resolution, 0.0, space.resolution)
-    # A start up to one cell beside free floor is free: the border of the grid is that coarse.
-    if not any(space.is_free(x + dx, y + dy) for dx in beside for dy in beside):
-        raise TaskError(
-            f"start: {x:.2f},{y:.2f} is inside an obstacle, too near to one, or shut in; "
-            "choose a start on free floor."
-        )
-    return min(goal.distances(x, y))
+    return goal.way_from(x, y, z)
 
 
 def score(
     goal: GoalField | None,
     metrics: EpisodeMetrics,
-    start: tuple[float, float],
+    start: tuple[float, ...],
     panorama: Panorama,
     rule: SuccessRule = HOME_RULE,
 ) -> Score:
@@ -117,7 +122,7 @@ def score(
     Args:
         goal: None when the episode is not scored.
         metrics: at the end of the episode.
-        start: position of the base at the start, metres.
+        start: (x, y) or (x, y, z) of the base at the start, metres.
         panorama: the last one.
         rule: what makes a stop a success; what an answer makes of it: ``answers.score_answer``.
 
@@ -128,7 +133,7 @@ def score(
         return Score(path_length_m=metrics.path_length)
     shortest = shortest_path(goal, *start)
     x, y = metrics.position
-    distances = goal.distances(x, y)
+    distances = goal.distances(x, y, metrics.z)
     error = min(distances)
     stopped = metrics.cause == "stopped"
     nearest = goal.targets[distances.index(error)]
@@ -138,7 +143,7 @@ def score(
         and (not rule.seen or seen(target, panorama) is not False)
         for target, distance in zip(goal.targets, distances, strict=True)
     )
-    spl, notes = _spl(success, shortest, metrics.path_length)
+    spl, notes = _spl(success, shortest, metrics.path_length, rule.unflown)
     if math.isinf(error):
         notes += ("navigation_error_m: the robot ended where it has no way to the goal",)
     closest = error if metrics.min_goal_distance is None else metrics.min_goal_distance
@@ -174,9 +179,12 @@ def seen(target: GoalTarget, panorama: Panorama) -> bool | None:
     )
 
 
-def _spl(success: bool, shortest: float, gone: float) -> tuple[float | None, tuple[str, ...]]:
-    if shortest == 0.0:
+def _spl(
+    success: bool, shortest: float, gone: float, unflown: float
+) -> tuple[float | None, tuple[str, ...]]:
+    asked = max(shortest - unflown, 0.0)
+    if asked == 0.0:
         return None, ("spl: the robot started at the goal",)
     if math.isinf(shortest):
         return None, ("spl: there is no way from the start to the goal",)
-    return (shortest / max(shortest, gone) if success else 0.0), ()
+    return (asked / max(asked, gone) if success else 0.0), ()

@@ -38,10 +38,11 @@ class EpisodeMetrics(Message):
     x: float = 0.0
     """Position of the base in the world, metres."""
     y: float = 0.0
+    z: float = 0.0
     path_length: float = 0.0
     """Metres, from steps of at least 1 mm."""
     goal_distance: float | None = None
-    """Geodesic metres to the goal now; None when the episode is not scored."""
+    """Metres to the goal now, as its rule measures; None when the episode is not scored."""
     min_goal_distance: float | None = None
     """The least of it so far."""
     collisions: int = 0
@@ -69,6 +70,6 @@ class EpisodeMetrics(Message):
         """Position of the base in the world, metres."""
         return self.x, self.y
 
-    def distance_from(self, x: float, y: float) -> float:
-        """Returns the straight distance between the base and a floor point, metres."""
-        return math.hypot(self.x - x, self.y - y)
+    def distance_from(self, x: float, y: float, z: float = 0.0) -> float:
+        """Returns the straight distance between the base and a point, metres."""
+        return math.hypot(self.x - x, self.y - y, self.z - z)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from unilavira_drake.errors import UniLaviraError
+from unilavira_drake.evaluation.air_goal import make_goal
 from unilavira_drake.evaluation.goal_area import success_area
-from unilavira_drake.evaluation.scoring import make_goal_field
 from unilavira_drake.mllm.backends import make_backend
 from unilavira_drake.mllm.judges import make_judge
 from unilavira_drake.recording.floor_plan import FloorPlan, Outline, floor_plan
@@ -75,7 +75,7 @@ def _goal(
     if not task.goal:
         return (), (), ()
     try:
-        goal = make_goal_field(task.goal, world, radius=radius)
+        goal = make_goal(task.goal, world, task.rule, radius=radius)
     except UniLaviraError as error:
         return (), (), (f"The goal is not on the maps: {error}",)
     return goal.places, success_area(goal, task.rule), ()

@@ -10,6 +10,8 @@ from unilavira_drake.errors import ScenarioError, unknown_name
 from unilavira_drake.worlds.furniture import CATEGORIES, furniture_boxes
 from unilavira_drake.worlds.furniture_library import furniture_model
 from unilavira_drake.worlds.materials import FLOORS, WALLS
+from unilavira_drake.worlds.outdoors import build as outdoors
+from unilavira_drake.worlds.outdoors.materials import GROUND
 from unilavira_drake.worlds.palette import PALETTE
 from unilavira_drake.worlds.panels import PATTERNS, SIGN, panel
 from unilavira_drake.worlds.schema import (
@@ -46,7 +48,10 @@ def build_world(entries: WorldFile, place: str) -> World:
     Raises:
         ScenarioError: names the place in the file, the value and the remedy.
     """
-    rooms = tuple(_room(entry, f"{place}: rooms: {entry.name!r}") for entry in entries.rooms)
+    floors = GROUND if entries.outdoors else FLOORS
+    rooms = tuple(
+        _room(entry, floors, f"{place}: rooms: {entry.name!r}") for entry in entries.rooms
+    )
     if not rooms:
         raise ScenarioError(f"{place}: rooms: empty; a world needs at least one room.")
     for key, size, low, high in (
@@ -56,6 +61,9 @@ def build_world(entries: WorldFile, place: str) -> World:
         if not low <= size <= high:
             raise ScenarioError(f"{place}: {key}: {size} is not usable; give {low} to {high} m.")
     _unique((*entries.rooms, *entries.doors, *entries.objects, *entries.panels), place)
+    if entries.outdoors:
+        return _outdoors(entries, rooms, place)
+    _check_indoors(entries, place)
     by_name = {room.name: room for room in rooms}
     _check_materials(rooms, place)
     things = _things(entries.objects, by_name, entries.wall_thickness, place)
@@ -86,6 +94,38 @@ def build_world(entries: WorldFile, place: str) -> World:
     )
 
 
+def _outdoors(entries: WorldFile, rooms: tuple[Room, ...], place: str) -> World:
+    """Returns a world under the open sky; of its objects the models are of the library."""
+    outdoors.check(entries, place)
+    _unique((*entries.rooms, *entries.objects, *outdoors.named(entries)), place)
+    by_name = {room.name: room for room in rooms}
+    models = [entry for entry in entries.objects if entry.model]
+    things = (
+        *outdoors.buildings(entries, rooms, place),
+        *outdoors.rows(entries, rooms, place),
+        *outdoors.shapes(entries, by_name, place),
+        *_things(models, by_name, 0.0, place),
+    )
+    for thing in things:
+        outdoors.check_inside(thing, rooms, place)
+    ground = outdoors.ground(entries, place)
+    return World(
+        name=entries.name,
+        rooms=rooms,
+        objects=things,
+        labels=outdoors.labels(things, rooms, ground),
+        wall_height=entries.wall_height,
+        outdoors=True,
+        ground=ground,
+    )
+
+
+def _check_indoors(entries: WorldFile, place: str) -> None:
+    for key in ("ground", "buildings", "rows", "surroundings"):
+        if getattr(entries, key):
+            raise ScenarioError(f"{place}: {key}: needs a world under the open sky; set outdoors.")
+
+
 def _labels(things: tuple[WorldObject, ...], rooms: tuple[Room, ...]) -> dict[int, LabelEntry]:
     entries = [LabelEntry(category=thing.category, instance=thing.name) for thing in things]
     entries += [LabelEntry("floor", f"{room.name}_floor", room.kind) for room in rooms]
@@ -93,13 +133,13 @@ def _labels(things: tuple[WorldObject, ...], rooms: tuple[Room, ...]) -> dict[in
     return dict(enumerate(entries, start=1))
 
 
-def _room(entry: RoomEntry, place: str) -> Room:
+def _room(entry: RoomEntry, floors: Mapping[str, object], place: str) -> Room:
     x_min, y_min, x_max, y_max = _numbers(entry.rectangle, 4, f"{place}: rectangle")
     if x_min >= x_max or y_min >= y_max:
         raise ScenarioError(
             f"{place}: rectangle: {entry.rectangle} is empty; give x_min, y_min, x_max, y_max."
         )
-    for key, value, valid in (("floor", entry.floor, FLOORS), ("walls", entry.walls, WALLS)):
+    for key, value, valid in (("floor", entry.floor, floors), ("walls", entry.walls, WALLS)):
         if value and value not in valid:
             raise ScenarioError(unknown_name("material", value, valid, f"{place}: {key}"))
     return Room(
@@ -305,7 +345,7 @@ def _check_apart(doors: list[DoorEntry], openings: tuple[Doorway, ...], place: s
 
 
 def _unique(
-    entries: Iterable[RoomEntry | DoorEntry | ObjectEntry | PanelEntry], place: str
+    entries: Iterable[RoomEntry | DoorEntry | ObjectEntry | PanelEntry | outdoors.Named], place: str
 ) -> None:
     seen: set[str] = set()
     for entry in entries:

@@ -25,11 +25,20 @@ class TexturedQuads(Message):
     """Rectangles that share one picture."""
 
     corners: NDArray[np.float64]
-    """(k, 4, 3) metres in the world, counter-clockwise seen from the lit side."""
+    """(k, 4, 3) metres in the world, counter-clockwise seen from the lit side; a triangle's last
+    two are the same."""
     uv: NDArray[np.float64]
     """(k, 4, 2): column and row of the picture, each in [0, 1] from its upper left corner."""
     image: NDArray[np.uint8]
     """(H, W, 3) uint8 RGB."""
+    lossy: bool = False
+    """Whether the picture may be kept as a JPEG."""
+
+    @property
+    def triangles(self) -> int:
+        """How many there are to draw."""
+        single = (self.corners[:, 2] == self.corners[:, 3]).all(axis=1)
+        return 2 * len(self.corners) - int(np.count_nonzero(single))
 
 
 def textured_mesh(name: str, parts: list[TexturedQuads]) -> Mesh:
@@ -59,12 +68,13 @@ def textured_mesh(name: str, parts: list[TexturedQuads]) -> Mesh:
     files: dict[str, MemoryFile] = {}
     for index, part in enumerate(parts):
         _add_part(document, blob, part, index)
-        picture = f"{name}_{index}.png"
+        kind = ".jpg" if part.lossy else ".png"
+        picture = f"{name}_{index}{kind}"
         document["images"].append({"uri": picture})
-        _, png = cv2.imencode(".png", cv2.cvtColor(_powers_of_two(part.image), cv2.COLOR_RGB2BGR))
+        _, encoded = cv2.imencode(kind, cv2.cvtColor(_powers_of_two(part.image), cv2.COLOR_RGB2BGR))
         # The stubs know only text; both bindings take bytes.
-        content: Any = png.tobytes()
-        files[picture] = MemoryFile(content, ".png", picture)
+        content: Any = encoded.tobytes()
+        files[picture] = MemoryFile(content, kind, picture)
     buffer = f"{name}.bin"
     document["buffers"] = [{"uri": buffer, "byteLength": len(blob)}]
     geometry: Any = bytes(blob)
@@ -88,7 +98,10 @@ def _add_part(document: dict[str, Any], blob: bytearray, part: TexturedQuads, in
     normals = np.cross(edges[:, 0], edges[:, 1])
     normals = np.repeat(normals / np.linalg.norm(normals, axis=1, keepdims=True), 4, axis=0)
     first = 4 * np.arange(len(part.corners))[:, None]
-    indices = (first + np.array([[0, 1, 2, 0, 2, 3]])).astype(np.uint32).ravel()
+    triangles = (first + np.array([[0, 1, 2, 0, 2, 3]])).reshape(-1, 3)
+    whole = (part.corners[:, 2] != part.corners[:, 3]).any(axis=1)
+    drawn = np.stack((np.ones_like(whole), whole), axis=1).ravel()
+    indices = triangles[drawn].astype(np.uint32).ravel()
     position = _accessor(document, blob, _y_up(corners), "VEC3")
     normal = _accessor(document, blob, _y_up(normals), "VEC3")
     uv = _accessor(document, blob, part.uv.reshape(-1, 2).astype(np.float32), "VEC2")

@@ -13,10 +13,20 @@ from pydrake.common.yaml import yaml_load_typed
 from unilavira_drake.errors import ScenarioError, unknown_name
 from unilavira_drake.resources import models_path
 from unilavira_drake.worlds.build import build_world
+from unilavira_drake.worlds.outdoors.entries import BuildingEntry, GroundEntry, RowEntry
+from unilavira_drake.worlds.outdoors.things import Building, Exterior, Place
 from unilavira_drake.worlds.schema import DoorEntry, ObjectEntry, PanelEntry, RoomEntry, WorldFile
 from unilavira_drake.worlds.world import Box, Panel, Placement, World, WorldObject
 
-_LISTS = {"rooms": RoomEntry, "doors": DoorEntry, "objects": ObjectEntry, "panels": PanelEntry}
+_LISTS = {
+    "rooms": RoomEntry,
+    "doors": DoorEntry,
+    "objects": ObjectEntry,
+    "panels": PanelEntry,
+    "ground": GroundEntry,
+    "buildings": BuildingEntry,
+    "rows": RowEntry,
+}
 
 
 def load_world(name_or_file: str, *, mirror: bool = False) -> World:
@@ -108,17 +118,19 @@ def _mirrored(world: World) -> World:
 
     A model of the furniture library is turned and moved, not mirrored in itself.
     """
-    rooms = []
-    for room in world.rooms:
-        x_min, y_min, x_max, y_max = room.rectangle
-        rooms.append(dc.replace(room, rectangle=(x_min, -y_max, x_max, -y_min)))
     return dc.replace(
         world,
-        rooms=tuple(rooms),
+        rooms=tuple(
+            dc.replace(room, rectangle=_flipped_rectangle(room.rectangle)) for room in world.rooms
+        ),
         objects=tuple(_flipped_object(thing) for thing in world.objects),
         walls=tuple(map(_flipped_box, world.walls)),
         doorways=tuple(dc.replace(opening, y=-opening.y) for opening in world.doorways),
         mirrored=True,
+        ground=tuple(
+            dc.replace(patch, rectangle=_flipped_rectangle(patch.rectangle))
+            for patch in world.ground
+        ),
     )
 
 
@@ -130,9 +142,26 @@ def _flipped_object(thing: WorldObject) -> WorldObject:
     elif isinstance(visual, Panel):
         facing = None if visual.facing is None else -visual.facing
         visual = dc.replace(visual, box=_flipped_box(visual.box), facing=facing)
+    elif isinstance(visual, Building):
+        visual = dc.replace(visual, place=_flipped_place(visual.place), mirrored=True)
+    elif isinstance(visual, Exterior):
+        places = tuple(map(_flipped_place, visual.places))
+        visual = dc.replace(visual, places=places, mirrored=True)
     return dc.replace(thing, boxes=tuple(map(_flipped_box, thing.boxes)), visual=visual)
 
 
 def _flipped_box(box: Box) -> Box:
     x, y, z = box.center
     return dc.replace(box, center=(x, -y, z), yaw=-box.yaw)
+
+
+def _flipped_rectangle(
+    rectangle: tuple[float, float, float, float],
+) -> tuple[float, float, float, float]:
+    x_min, y_min, x_max, y_max = rectangle
+    return x_min, -y_max, x_max, -y_min
+
+
+def _flipped_place(place: Place) -> Place:
+    x, y, z, yaw = place
+    return x, -y, z, -yaw

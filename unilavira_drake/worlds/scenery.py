@@ -32,6 +32,8 @@ from unilavira_drake.worlds.furniture_library import (
     furniture_models,
 )
 from unilavira_drake.worlds.gltf import TexturedQuads, textured_mesh
+from unilavira_drake.worlds.outdoors.meshes import ground_meshes, solid_ground, thing_quads
+from unilavira_drake.worlds.outdoors.things import Building, Exterior
 from unilavira_drake.worlds.palette import PALETTE
 from unilavira_drake.worlds.panels import panel_quads
 from unilavira_drake.worlds.world import Box, Panel, Placement, Room, World, WorldObject
@@ -75,6 +77,9 @@ def lights(*, mirrored: bool = False, textured: bool = False) -> list[LightParam
     ]
 
 
+_HERE = RigidTransform()
+
+
 @dataclass(frozen=True)
 class _Shape:
     """A mesh with one label."""
@@ -92,12 +97,14 @@ class _Shape:
 def add_scenery(plant: MultibodyPlant, scene_graph: SceneGraph, world: World) -> None:
     """Adds a world's collision boxes and labelled meshes to the world body.
 
-    Call it before ``plant.Finalize()``.  The floor has no collision geometry: the bases move in
-    the plane.
+    Call it before ``plant.Finalize()``.  The floor of rooms has no collision geometry: the bases
+    move in the plane.  The ground outdoors has, for what flies.
     """
     friction = CoulombFriction(0.5, 0.5)
     boxes = [("wall", box) for box in world.walls]
     boxes += [(thing.name, box) for thing in world.objects if thing.solid for box in thing.boxes]
+    if world.outdoors:
+        boxes.append(("ground", solid_ground(world)))
     for index, (name, box) in enumerate(boxes):
         p_WB: Any = box.center
         plant.RegisterCollisionGeometry(
@@ -118,8 +125,12 @@ def scenery_triangles(world: World) -> int:
     for thing in world.objects:
         if isinstance(thing.visual, Placement):
             count += models[thing.visual.model].triangles
+        elif isinstance(thing.visual, Building | Exterior):
+            count += sum(part.triangles for part in thing_quads(thing.visual))
         else:
             count += 12 * len(thing.boxes)
+    if world.outdoors:
+        return count + sum(part.triangles for _, part in ground_meshes(world))
     for room in world.rooms:
         walls = shell.walls(room, world.doorways, (), world.wall_height, world.wall_thickness)
         count += 2 * (2 + sum(len(part.corners) for part in walls))
@@ -131,6 +142,9 @@ def _shapes(world: World) -> Iterable[_Shape]:
         label = world.label_of(thing.name)
         assert label is not None
         yield _thing(thing, label, textured=world.textured)
+    if world.outdoors:
+        yield from _ground(world)
+        return
     wall = world.label_of("walls")
     assert wall is not None
     for room in world.rooms:
@@ -156,6 +170,8 @@ def _thing(thing: WorldObject, label: int, *, textured: bool) -> _Shape:
     if isinstance(visual, Panel):
         mesh = textured_mesh(thing.name, panel_quads(visual))
         return _Shape(thing.name, label, mesh, RigidTransform())
+    if isinstance(visual, Building | Exterior):
+        return _Shape(thing.name, label, textured_mesh(thing.name, thing_quads(visual)), _HERE)
     quads, normals = _box_quads(thing.boxes)
     color = PALETTE[thing.color]
     if not textured:
@@ -163,6 +179,13 @@ def _thing(thing: WorldObject, label: int, *, textured: bool) -> _Shape:
     image = np.full((4, 4, 3), np.round(255 * np.array(color)), np.uint8)
     plain = TexturedQuads(quads, np.full((len(quads), 4, 2), 0.5), image)
     return _Shape(thing.name, label, textured_mesh(thing.name, [plain]), RigidTransform())
+
+
+def _ground(world: World) -> Iterable[_Shape]:
+    for name, part in ground_meshes(world):
+        label = world.label_of(name)
+        assert label is not None
+        yield _Shape(name, label, textured_mesh(name, [part]), _HERE)
 
 
 def _textured_room(world: World, room: Room, floor: int, wall: int) -> Iterable[_Shape]:

@@ -2,6 +2,8 @@
 
 import dataclasses as dc
 
+from unilavira_drake.worlds.outdoors.entries import BuildingEntry, GroundEntry, RowEntry
+
 
 @dc.dataclass
 class RoomEntry:
@@ -92,3 +94,11 @@ class WorldFile:
     doors: list[DoorEntry] = dc.field(default_factory=list)
     objects: list[ObjectEntry] = dc.field(default_factory=list)
     panels: list[PanelEntry] = dc.field(default_factory=list)
+    # Under the open sky: rooms are districts, floors are of outdoors/materials.py, and there are
+    # neither walls nor ceilings.
+    outdoors: bool = False
+    # Width of the meadow around the districts, metres.
+    surroundings: float = 0.0
+    ground: list[GroundEntry] = dc.field(default_factory=list)
+    buildings: list[BuildingEntry] = dc.field(default_factory=list)
+    rows: list[RowEntry] = dc.field(default_factory=list)

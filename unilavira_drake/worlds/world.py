@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from unilavira_drake.messages import Message
+from unilavira_drake.worlds.outdoors.things import Building, Exterior, GroundPatch
 
 JAMB_WIDTH = 0.09
 """Metres; jambs stand outside the clear width of a doorway."""
@@ -123,7 +124,7 @@ class WorldObject(Message):
     """Name of the room; for a door the two names joined by ``|``."""
     boxes: tuple[Box, ...] = ()
     """Collision geometry in the world; visible, too, where there is no ``visual``."""
-    visual: Placement | Panel | None = None
+    visual: Placement | Panel | Building | Exterior | None = None
     solid: bool = True
     """Whether a robot collides with it."""
 
@@ -157,11 +158,23 @@ class World(Message):
     """Metres."""
     mirrored: bool = False
     """Whether y was negated when the world was read; starts and goals given as numbers follow."""
+    outdoors: bool = False
+    """Whether it lies under the open sky: rooms are districts, without walls and ceilings."""
+    ground: tuple[GroundPatch, ...] = ()
+    """What lies on the ground, of a world outdoors; later ones over earlier ones."""
 
     @property
     def textured(self) -> bool:
         """Whether floors and walls have materials."""
         return any(room.floor for room in self.rooms)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """(x_min, y_min, x_max, y_max) of all rooms, metres."""
+        rectangles = [room.rectangle for room in self.rooms]
+        x_min, y_min = (min(rectangle[i] for rectangle in rectangles) for i in (0, 1))
+        x_max, y_max = (max(rectangle[i] for rectangle in rectangles) for i in (2, 3))
+        return x_min, y_min, x_max, y_max
 
     def room_at(self, x: float, y: float) -> Room | None:
         """Returns the room that holds a point of the floor, or None outside."""

@@ -1,0 +1,1 @@
+"""Worlds under the open sky: ground, buildings, plants and vehicles."""
