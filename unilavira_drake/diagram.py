@@ -16,6 +16,7 @@ from unilavira_drake.messages import Frame
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.model_pair import ModelPair, make_models
 from unilavira_drake.navigation import make_navigation
+from unilavira_drake.people.adding import mapping_among, planning_among
 from unilavira_drake.people.crowd import with_people
 from unilavira_drake.recording.recorder import Recorder
 from unilavira_drake.scenario import Scenario
@@ -117,8 +118,8 @@ def make_navigation_diagram(
         lambda: make_navigation(
             robot=scenario.robot,
             intrinsics=intrinsics,
-            mapping=scenario.mapping,
-            planning=scenario.planning,
+            mapping=mapping_among(scenario.people, scenario.mapping),
+            planning=planning_among(scenario.people, scenario.planning),
             tick=scenario.tick,
             time_step=scenario.plant.time_step,
             replace=own,

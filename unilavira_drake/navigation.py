@@ -113,6 +113,7 @@ def _add_mapper_and_planner(
             travel=mapping.travel,
             turn=math.radians(mapping.turn_degrees),
             rest_period=mapping.rest_period,
+            moving=mapping.moving,
             period=tick,
         ),
     )
@@ -125,6 +126,7 @@ def _add_mapper_and_planner(
             tolerance=planning.tolerance,
             stuck_time=planning.stuck_time,
             travel_factor=planning.travel_factor,
+            patience=planning.patience,
             period=tick,
         ),
     )

@@ -47,6 +47,7 @@ _RULES: dict[str, _Rule] = {
     "vision_latency.sigma": _NOT_NEGATIVE,
     "mapping.min_height": _NOT_NEGATIVE,
     "planning.snap_distance": _NOT_NEGATIVE,
+    "planning.patience": _NOT_NEGATIVE,
     "memory.waypoints": ("at least 2", lambda v: v >= 2),
     "mapping.resolution": ("0.01 to 0.5", lambda v: 0.01 <= v <= 0.5),
     "mapping.stride": ("1 to 16", lambda v: 1 <= v <= 16),

@@ -14,6 +14,7 @@ from pydrake.systems.primitives import ConstantValueSource
 from unilavira_drake import load_scenario
 from unilavira_drake.messages import Goal, Panorama, Sweep
 from unilavira_drake.navigation import make_navigation
+from unilavira_drake.people.adding import mapping_among, planning_among
 from unilavira_drake.sensors.rig import front_intrinsics
 from unilavira_drake.station import make_navigation_station
 
@@ -43,8 +44,8 @@ class Drive:
             make_navigation(
                 robot=scenario.robot,
                 intrinsics=front_intrinsics(scenario.robot),
-                mapping=scenario.mapping,
-                planning=scenario.planning,
+                mapping=mapping_among(scenario.people, scenario.mapping),
+                planning=planning_among(scenario.people, scenario.planning),
                 tick=scenario.tick,
                 time_step=scenario.plant.time_step,
             )

@@ -7,8 +7,8 @@ import math
 
 import pytest
 
-from unilavira_drake.people.crowd import Person
-from unilavira_drake.people.walking import AHEAD, Manners, Walker, next_step, swing
+from unilavira_drake.people.crowd import RADIUS, Person
+from unilavira_drake.people.walking import AHEAD, Manners, RobotSeen, Walker, next_step, swing
 
 PERSON = Person(
     "person_1", 7, "red", walk=((0.0, 0.0), (4.0, 0.0), (4.0, 2.0)), speed=1.0, pauses=(2.0, 3.0)
@@ -35,7 +35,7 @@ class Walk:
                 period=PERIOD,
                 pose=self.pose,
                 moving=self.moving,
-                robot=robot,
+                robot=None if robot is None else RobotSeen(*robot),
             )
             x, y, yaw = self.pose
             if stuck:
@@ -102,6 +102,26 @@ def test_a_robot_beside_or_behind_holds_nobody():
             x, y, _ = walk.pose
             walk.go(0.1, robot=(x + 0.5 * math.cos(bearing), y + 0.5 * math.sin(bearing)))
         assert walk.pose[0] > 1.5
+
+
+def test_polite_people_let_a_robot_pass_that_would_cross_their_way():
+    walk = Walk()
+    # It comes from the right and will be on the way when the person is.
+    robot = RobotSeen(2.0, -3.0, math.pi / 2, 0.35, 0.28, 0.0, 0.8)
+    distances = []
+    for _ in range(round(8.0 / PERIOD)):
+        walk.walker, wish = next_step(
+            PERSON, walk.walker, walk.manners, time=walk.time, period=PERIOD, pose=walk.pose,
+            moving=walk.moving, robot=robot,
+        )  # fmt: skip
+        x, y, yaw = walk.pose
+        walk.moving = math.hypot(wish.vx, wish.vy)
+        walk.pose = (x + wish.vx * PERIOD, y + wish.vy * PERIOD, yaw + wish.yaw_rate * PERIOD)
+        walk.time += PERIOD
+        robot = dataclasses.replace(robot, y=robot.y + robot.vy * PERIOD)
+        distances.append(math.hypot(*robot.nearest(*walk.pose[:2])) - RADIUS)
+    assert min(distances) > 0.1
+    assert walk.pose[0] > 3.0
 
 
 def test_impolite_people_keep_walking():

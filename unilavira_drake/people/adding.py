@@ -2,16 +2,43 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import DiagramBuilder, System
 
+from unilavira_drake.mapping.config import MappingConfig
 from unilavira_drake.people.bodies import PersonBody
 from unilavira_drake.people.config import PeopleConfig
 from unilavira_drake.people.pedestrians import Pedestrians, PeopleWatch
 from unilavira_drake.people.walking import Manners
+from unilavira_drake.planning.config import PlanningConfig
+
+AMONG_PEOPLE = {"travel": 0.08, "rest_period": 0.3}
+"""Metres and seconds between two looks at most: a person walks a robot's width in half a second."""
+
+
+WAIT = 15.0
+"""Seconds for which the planner waits where people stand in the only way."""
+
+
+def mapping_among(people: PeopleConfig, mapping: MappingConfig) -> MappingConfig:
+    """Returns the mapper's numbers for a world with these people: it looks more often, and believes
+    at once what appears on free floor and what is gone from it.
+    """
+    if people.count == 0:
+        return mapping
+    often = {name: min(getattr(mapping, name), most) for name, most in AMONG_PEOPLE.items()}
+    return dataclasses.replace(mapping, moving=True, **often)
+
+
+def planning_among(people: PeopleConfig, planning: PlanningConfig) -> PlanningConfig:
+    """Returns the planner's numbers for a world with these people: it waits till they are gone."""
+    if people.count == 0:
+        return planning
+    return dataclasses.replace(planning, patience=max(planning.patience, WAIT))
 
 
 def connect_people(

@@ -38,13 +38,17 @@ from pydrake.multibody.tree import (
     SpatialInertia,
 )
 
-from unilavira_drake.people.crowd import RADIUS, Person
+from unilavira_drake.people.crowd import Person
 from unilavira_drake.people.figure import HIP, SHOULDER, USUAL_HEIGHT, figure
 
 MASS = 70.0
 """Kilograms."""
 PUSH = 150.0
 """How hard a person pushes at most, newtons."""
+COLUMNS = (-0.12, 0.0, 0.12)
+"""A body collides as upright cylinders side by side, from arm to arm; metres to the left."""
+THICKNESS = 0.13
+"""Their radius, metres."""
 JOINTS = 7
 """x, y, yaw, left leg, right leg, left arm, right arm."""
 
@@ -123,14 +127,15 @@ def _add(plant: MultibodyPlant, person: Person) -> PersonBody:
         carriers[name] = limb
     _dress(plant, person, carriers, scale)
     length = 0.9 * person.height
-    p_BG: Any = [0.0, 0.0, length / 2]
-    plant.RegisterCollisionGeometry(
-        body,
-        RigidTransform(p_BG),
-        Cylinder(RADIUS, length),
-        f"{person.name}_collision",
-        CoulombFriction(0.4, 0.4),
-    )
+    for k, side in enumerate(COLUMNS):
+        p_BG: Any = [0.0, side, length / 2]
+        plant.RegisterCollisionGeometry(
+            body,
+            RigidTransform(p_BG),
+            Cylinder(THICKNESS, length),
+            f"{person.name}_collision_{k}",
+            CoulombFriction(0.4, 0.4),
+        )
     return PersonBody(person, instance, body.index())
 
 

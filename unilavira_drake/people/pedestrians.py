@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Sequence
@@ -14,10 +15,10 @@ from pydrake.multibody.plant import ContactResults
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
+from unilavira_drake.messages import Message
 from unilavira_drake.messages.people import PeopleTruth, PersonTruth
-from unilavira_drake.people.bodies import JOINTS, PersonBody
-from unilavira_drake.people.crowd import RADIUS
-from unilavira_drake.people.walking import Manners, Walker, Wish, next_step, swing
+from unilavira_drake.people.bodies import COLUMNS, JOINTS, THICKNESS, PersonBody
+from unilavira_drake.people.walking import Manners, RobotSeen, Walker, Wish, next_step, swing
 from unilavira_drake.ports import InputReader, vector_input
 
 CONTACT_FORCE = 1.0
@@ -72,7 +73,7 @@ class Pedestrians(LeafSystem):
         self._joints = tuple(
             vector_input(self, f"{person.name}.joint_state", 2 * JOINTS) for person in self._people
         )
-        walkers = tuple(Walker() for _ in bodies)
+        walkers = (RobotSeen(), *(Walker() for _ in bodies))
         self._walkers = self.DeclareAbstractState(AbstractValue.Make(walkers))
         self._wishes = []
         for person in self._people:
@@ -84,10 +85,13 @@ class Pedestrians(LeafSystem):
     def _update(self, context: Context, state: State) -> EventStatus:
         index = int(self._walkers)
         kept: Any = context.get_abstract_state(index)
-        walkers: tuple[Walker, ...] = kept.get_value()
+        seen, *walkers = kept.get_value()
         poses: Any = self._poses.Eval(context)
-        X_WB = poses[int(self._robot)]
-        stepped = []
+        robot = _seen(poses[int(self._robot)], self._footprint)
+        if context.get_time() > 0.0:
+            vx, vy = (robot.x - seen.x) / self._period, (robot.y - seen.y) / self._period
+            robot = dataclasses.replace(robot, vx=vx, vy=vy)
+        stepped: list[Message] = [robot]
         for k, person in enumerate(self._people):
             joints = self._joints[k](context).tolist()
             x, y, yaw = joints[:3]
@@ -99,7 +103,7 @@ class Pedestrians(LeafSystem):
                 period=self._period,
                 pose=(x, y, yaw),
                 moving=math.hypot(joints[JOINTS], joints[JOINTS + 1]),
-                robot=nearest_point(X_WB, self._footprint, x, y),
+                robot=robot,
             )
             stepped.append(walker)
             desired: Any = state.get_mutable_discrete_state(self._wishes[k])
@@ -151,36 +155,29 @@ class PeopleWatch(LeafSystem):
     def _calc(self, context: Any, output: Any) -> None:
         poses: Any = self._poses.Eval(context)
         touched = _touched(self._contacts(context))
+        robot = _seen(poses[int(self._robot)], self._footprint)
         people = []
         for one in self._bodies:
             X_WP = poses[int(one.body)].GetAsMatrix34()
             x, y = float(X_WP[0, 3]), float(X_WP[1, 3])
-            near = nearest_point(poses[int(self._robot)], self._footprint, x, y)
+            c, s = float(X_WP[0, 0]), float(X_WP[1, 0])
+            gaps = (math.hypot(*robot.nearest(x - s * side, y + c * side)) for side in COLUMNS)
             people.append(
                 PersonTruth(
                     name=one.person.name,
                     position=(x, y),
-                    yaw=math.atan2(X_WP[1, 0], X_WP[0, 0]),
-                    gap=max(math.hypot(near[0] - x, near[1] - y) - RADIUS, 0.0),
+                    yaw=math.atan2(s, c),
+                    gap=max(min(gaps) - THICKNESS, 0.0),
                     touched=int(one.body) in touched,
                 )
             )
         output.set_value(PeopleTruth(tuple(people)))
 
 
-def nearest_point(
-    X_WB: RigidTransform, footprint: tuple[float, float], x: float, y: float
-) -> tuple[float, float]:
-    """Returns the point of the robot's footprint nearest to a point of the floor, metres."""
+def _seen(X_WB: RigidTransform, footprint: tuple[float, float]) -> RobotSeen:
     X = X_WB.GetAsMatrix34()
-    c, s = float(X[0, 0]), float(X[1, 0])
-    norm = max(math.hypot(c, s), 1e-9)
-    c, s = c / norm, s / norm
-    dx, dy = x - float(X[0, 3]), y - float(X[1, 3])
-    half_x, half_y = footprint[0] / 2.0, footprint[1] / 2.0
-    u = min(max(c * dx + s * dy, -half_x), half_x)
-    v = min(max(c * dy - s * dx, -half_y), half_y)
-    return float(X[0, 3]) + c * u - s * v, float(X[1, 3]) + s * u + c * v
+    yaw = math.atan2(X[1, 0], X[0, 0])
+    return RobotSeen(float(X[0, 3]), float(X[1, 3]), yaw, footprint[0] / 2.0, footprint[1] / 2.0)
 
 
 def _touched(contacts: ContactResults) -> set[int]:

@@ -6,7 +6,7 @@ import dataclasses
 import math
 
 from unilavira_drake.messages import Message
-from unilavira_drake.people.crowd import Person
+from unilavira_drake.people.crowd import RADIUS, Person
 
 ACCELERATION = 1.5
 """Metres a second squared."""
@@ -14,6 +14,12 @@ TURN_GAIN, TURN_RATE = 4.0, 3.0
 """1/s of the heading's error, and at most rad/s."""
 AHEAD = math.radians(60.0)
 """The robot is ahead of who walks within this angle of its direction."""
+FORESIGHT, FORESEEN = 0.25, 10
+"""Polite people look so many steps of so many seconds ahead."""
+MARGIN = 0.25
+"""What they want to keep between them and the robot, metres."""
+STANDING = 0.05
+"""A slower robot stands, metres a second."""
 REACHED = 0.10
 """A point of the walk is reached within this distance, metres."""
 SLOWEST = 0.25
@@ -54,6 +60,29 @@ class Wish(Message):
 
 
 @dataclasses.dataclass(frozen=True)
+class RobotSeen(Message):
+    """A robot as people see it: a rectangle that moves straight on."""
+
+    x: float = 0.0
+    y: float = 0.0
+    """Of its middle, metres."""
+    yaw: float = 0.0
+    half_length: float = 0.0
+    half_width: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    """Metres a second, in the world."""
+
+    def nearest(self, x: float, y: float, after: float = 0.0) -> tuple[float, float]:
+        """Returns its point nearest to (x, y), relative to that, in so many seconds; metres."""
+        dx, dy = x - self.x - self.vx * after, y - self.y - self.vy * after
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        u = min(max(c * dx + s * dy, -self.half_length), self.half_length)
+        v = min(max(c * dy - s * dx, -self.half_width), self.half_width)
+        return c * u - s * v - dx, s * u + c * v - dy
+
+
+@dataclasses.dataclass(frozen=True)
 class Manners(Message):
     """How people treat a robot in their way, see ``PeopleConfig``."""
 
@@ -71,7 +100,7 @@ def next_step(
     period: float,
     pose: tuple[float, float, float],
     moving: float,
-    robot: tuple[float, float] | None,
+    robot: RobotSeen | None,
 ) -> tuple[Walker, Wish]:
     """Returns where in the walk the person is now, and the wish for the next period.
 
@@ -83,15 +112,19 @@ def next_step(
         period: seconds.
         pose: x, y (metres) and yaw (radians) of the person.
         moving: measured speed, metres a second.
-        robot: the point of the robot nearest to the person, metres; None without one.
+        robot: None without one.
     """
     x, y, yaw = pose
     walker = _arrived(person, walker, time, x, y)
     goal_x, goal_y = person.walk[walker.target]
     bearing = math.atan2(goal_y - y, goal_x - x)
     resting = time < max(walker.resume, person.delay)
-    waits = not resting and manners.polite and _ahead(robot, x, y, bearing, manners.stop_distance)
-    # While it waits its neighbour's picture must not spin: it goes on looking along the walk.
+    waits = (
+        not resting
+        and manners.polite
+        and robot is not None
+        and _must_wait(robot, x, y, bearing, person.speed, manners)
+    )
     error = math.remainder(bearing - yaw, 2.0 * math.pi)
     wish = 0.0 if resting or waits else person.speed * max(math.cos(error), 0.0)
     step = ACCELERATION * period
@@ -148,12 +181,22 @@ def _patient(
     return dataclasses.replace(walker, target=target, way=-walker.way, held=-1.0)
 
 
-def _ahead(
-    robot: tuple[float, float] | None, x: float, y: float, bearing: float, distance: float
+def _must_wait(
+    robot: RobotSeen, x: float, y: float, bearing: float, speed: float, manners: Manners
 ) -> bool:
-    if robot is None:
+    """Whether the robot is near ahead, or would come too near if both went straight on."""
+    dx, dy = robot.nearest(x, y)
+    near = math.hypot(dx, dy)
+    turn = abs(math.remainder(math.atan2(dy, dx) - bearing, 2.0 * math.pi))
+    if near < manners.stop_distance and turn < AHEAD:
+        return True
+    vx, vy = speed * math.cos(bearing), speed * math.sin(bearing)
+    if math.hypot(robot.vx, robot.vy) < STANDING:
         return False
-    dx, dy = robot[0] - x, robot[1] - y
-    if math.hypot(dx, dy) > distance:
-        return False
-    return abs(math.remainder(math.atan2(dy, dx) - bearing, 2.0 * math.pi)) < AHEAD
+    for k in range(1, FORESEEN + 1):
+        after = k * FORESIGHT
+        distance = math.hypot(*robot.nearest(x + vx * after, y + vy * after, after))
+        # Who is too near already may go where it becomes more.
+        if distance < min(RADIUS + MARGIN, near):
+            return True
+    return False
