@@ -41,6 +41,9 @@ MIN_LEVEL = 0.2
 """A camera whose axis has less than this horizontal share looks at the floor or the ceiling: it
 has no bearings, and is not integrated."""
 
+NEWEST = 4
+"""Where things move, see ``MappingParameters.newest``."""
+
 UPRIGHT = (0.0, 0.0, 1.0)
 
 

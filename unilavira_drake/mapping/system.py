@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageDepth32F
 
-from unilavira_drake.mapping.depth_scan import FREE_STEP, warm_up
+from unilavira_drake.mapping.depth_scan import warm_up
 from unilavira_drake.mapping.depth_view import DepthView
-from unilavira_drake.mapping.occupancy import MappingParameters, integrate
+from unilavira_drake.mapping.occupancy import NEWEST, MappingParameters, integrate
 from unilavira_drake.mapping.storeys import Storey, Storeys
 from unilavira_drake.messages import Intrinsics, Message, OccupancyMap, Panorama
 from unilavira_drake.ports import (
@@ -105,7 +105,7 @@ class OccupancyMapper(Level):
             max_height=max_height,
             footprint_radius=footprint_radius,
             stride=stride,
-            newest=FREE_STEP if moving else 0,
+            newest=NEWEST if moving else 0,
             saturation=saturation,
         )
         self._travel = travel

@@ -6,12 +6,13 @@ import dataclasses
 from collections.abc import Sequence
 
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import BodyIndex
-from pydrake.systems.framework import DiagramBuilder, System
+from pydrake.multibody.tree import RigidBody
+from pydrake.systems.framework import DiagramBuilder
 
 from unilavira_drake.mapping.config import MappingConfig
-from unilavira_drake.people.bodies import PersonBody
+from unilavira_drake.people.bodies import find_people
 from unilavira_drake.people.config import PeopleConfig
+from unilavira_drake.people.crowd import Person
 from unilavira_drake.people.pedestrians import Pedestrians, PeopleWatch
 from unilavira_drake.people.walking import Manners
 from unilavira_drake.planning.config import PlanningConfig
@@ -44,28 +45,27 @@ def planning_among(people: PeopleConfig, planning: PlanningConfig) -> PlanningCo
 def connect_people(
     builder: DiagramBuilder,
     plant: MultibodyPlant,
-    bodies: Sequence[PersonBody],
+    people: Sequence[Person],
     config: PeopleConfig,
-    *,
-    robot: BodyIndex,
+    robot: RigidBody,
     footprint: tuple[float, float],
-) -> System:
+) -> None:
     """Adds the Systems that walk people and watch them, after ``plant.Finalize()``.
+
+    It exports the truth about them as ``cheat_people``.
 
     Args:
         builder: of the plant's diagram.
-        plant: with the people's bodies.
-        bodies: of the people, at least one.
+        plant: with the people's bodies (``add_people``).
+        people: at least one.
         config: their manners.
         robot: the robot's body.
         footprint: length and width of the robot about that body, metres.
-
-    Returns:
-        The System whose output ``cheat_people`` is the truth about them.
     """
+    bodies = find_people(plant, people)
     manners = Manners(config.polite, config.stop_distance, config.patience)
     walking = builder.AddSystem(
-        Pedestrians(bodies=bodies, robot=robot, footprint=footprint, manners=manners)
+        Pedestrians(bodies=bodies, robot=robot.index(), footprint=footprint, manners=manners)
     )
     for one in bodies:
         name = one.person.name
@@ -76,8 +76,8 @@ def connect_people(
             walking.GetOutputPort(f"{name}.desired_joint_state"),
             plant.get_desired_state_input_port(one.instance),
         )
-    watch = builder.AddSystem(PeopleWatch(bodies=bodies, robot=robot, footprint=footprint))
+    watch = builder.AddSystem(PeopleWatch(bodies=bodies, robot=robot.index(), footprint=footprint))
     for system in (walking, watch):
         builder.Connect(plant.get_body_poses_output_port(), system.GetInputPort("body_poses"))
     builder.Connect(plant.get_contact_results_output_port(), watch.GetInputPort("contact_results"))
-    return watch
+    builder.ExportOutput(watch.GetOutputPort("cheat_people"), "cheat_people")

@@ -17,6 +17,7 @@ import numpy as np
 from pydrake.geometry import (
     CollisionFilterDeclaration,
     Cylinder,
+    GeometryId,
     GeometryInstance,
     GeometrySet,
     IllustrationProperties,
@@ -75,34 +76,34 @@ class PersonBody:
     body: BodyIndex
 
 
-def add_people(
-    plant: MultibodyPlant, scene_graph: SceneGraph, people: Sequence[Person]
-) -> tuple[PersonBody, ...]:
-    """Adds people to a plant, after its scenery and before ``plant.Finalize()``.
-
-    Each stands at the start of the walk by default.
-    """
-    bodies = tuple(_add(plant, person) for person in people)
-    if bodies:
-        ids = [id_ for one in bodies for id_ in _collisions(plant, one)]
-        world = plant.GetCollisionGeometriesForBody(plant.world_body())
-        rule = CollisionFilterDeclaration()
-        rule.ExcludeWithin(GeometrySet(ids))
-        rule.ExcludeBetween(GeometrySet(ids), GeometrySet(world))
-        scene_graph.collision_filter_manager().Apply(rule)
-    return bodies
+def add_people(plant: MultibodyPlant, scene_graph: SceneGraph, people: Sequence[Person]) -> None:
+    """Adds people to a plant, after its scenery and before ``plant.Finalize()``."""
+    if not people:
+        return
+    ids = [id_ for person in people for id_ in _add(plant, person)]
+    world = plant.GetCollisionGeometriesForBody(plant.world_body())
+    rule = CollisionFilterDeclaration()
+    rule.ExcludeWithin(GeometrySet(ids))
+    rule.ExcludeBetween(GeometrySet(ids), GeometrySet(world))
+    scene_graph.collision_filter_manager().Apply(rule)
 
 
-def place_people(plant: MultibodyPlant, bodies: Sequence[PersonBody]) -> None:
-    """Makes the starts of the walks the default positions of a finalized plant."""
-    for one in bodies:
-        (x, y), (to_x, to_y) = one.person.walk[:2]
+def find_people(plant: MultibodyPlant, people: Sequence[Person]) -> tuple[PersonBody, ...]:
+    """Returns where people are in a finalized plant, who by default begin where their walks do."""
+    bodies = []
+    for person in people:
+        instance = plant.GetModelInstanceByName(person.name)
+        body = plant.GetBodyByName(person.name, instance)
+        bodies.append(PersonBody(person, instance, body.index()))
+        (x, y), (to_x, to_y) = person.walk[:2]
         q: Any = np.zeros(JOINTS)
         q[:3] = x, y, np.arctan2(to_y - y, to_x - x)
-        plant.SetDefaultPositions(one.instance, q)
+        plant.SetDefaultPositions(instance, q)
+    return tuple(bodies)
 
 
-def _add(plant: MultibodyPlant, person: Person) -> PersonBody:
+def _add(plant: MultibodyPlant, person: Person) -> list[GeometryId]:
+    """Adds one person and returns the collision geometries."""
     instance = plant.AddModelInstance(person.name)
     scale = person.height / USUAL_HEIGHT
     light = SpatialInertia.SolidBoxWithMass(0.01, 0.1, 0.1, 0.1)
@@ -136,7 +137,7 @@ def _add(plant: MultibodyPlant, person: Person) -> PersonBody:
             f"{person.name}_collision_{k}",
             CoulombFriction(0.4, 0.4),
         )
-    return PersonBody(person, instance, body.index())
+    return list(plant.GetCollisionGeometriesForBody(body))
 
 
 def _actuate(
@@ -161,7 +162,3 @@ def _dress(
         instance.set_perception_properties(perception)
         instance.set_illustration_properties(illustration)
         plant.RegisterVisualGeometry(carriers[part.limb], instance)
-
-
-def _collisions(plant: MultibodyPlant, one: PersonBody) -> list[Any]:
-    return list(plant.GetCollisionGeometriesForBody(plant.get_body(one.body)))
