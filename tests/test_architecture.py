@@ -17,6 +17,7 @@ LAYERS = (
     ("messages",),
     ("tasks", "answer_words", "stated_direction", "mllm"),
     ("ports", "planning", "mapping", "language", "memory", "vision", "sensors", "worlds", "raster"),
+    ("people",),
     ("model_link", "rendering_check", "asking", "endpoint_check", "serving"),
     ("robots",),
     ("scenario", "scenario_schema", "task_choice"),

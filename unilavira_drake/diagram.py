@@ -16,6 +16,8 @@ from unilavira_drake.messages import Frame
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.model_pair import ModelPair, make_models
 from unilavira_drake.navigation import make_navigation
+from unilavira_drake.people.adding import mapping_among, planning_among
+from unilavira_drake.people.crowd import with_people
 from unilavira_drake.recording.recorder import Recorder
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.sensors.detections import GroundTruthDetector
@@ -63,7 +65,9 @@ def make_navigation_diagram(
     warm_up()  # The agent takes this function from us; no System of its own compiles it.
     grounder = has_grounder(scenario.grounder, own)
     models = models or make_models(scenario)
-    world = load_world(scenario.world.name, mirror=scenario.world.mirror)
+    world = with_people(
+        load_world(scenario.world.name, mirror=scenario.world.mirror), scenario.people
+    )
     task = choose_task(scenario)
     start = parse_start(task.start, world, radius=scenario.robot.turning_radius)
     intrinsics = front_intrinsics(scenario.robot)
@@ -114,8 +118,8 @@ def make_navigation_diagram(
         lambda: make_navigation(
             robot=scenario.robot,
             intrinsics=intrinsics,
-            mapping=scenario.mapping,
-            planning=scenario.planning,
+            mapping=mapping_among(scenario.people, scenario.mapping),
+            planning=planning_among(scenario.people, scenario.planning),
             tick=scenario.tick,
             time_step=scenario.plant.time_step,
             replace=own,
@@ -128,6 +132,8 @@ def make_navigation_diagram(
         ),
     )
     _close_the_ring(wiring, scenario.robot.views)
+    if scenario.people.count:
+        wiring.connect("station", "cheat_people", "episode_monitor")
     if on_message is not None:
         wiring.add(
             "recorder", lambda: Recorder(on_message, period=scenario.tick, grounder=grounder)

@@ -19,6 +19,7 @@ from unilavira_drake.messages import (
     Panorama,
 )
 from unilavira_drake.messages.metrics import UNCOUNTED, UNREACHABLE, EpisodeMetrics
+from unilavira_drake.messages.people import PeopleTruth
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.ports import InputReader, Level, message_input, pose_input
 from unilavira_drake.scenario import Budgets
@@ -47,6 +48,7 @@ class MonitorState(Message):
     status: tuple[int, str] = (0, "arrived")
     yaw: float = 0.0
     in_contact: bool = False
+    on_person: bool = False
     usage: tuple[ModelUsage, ...] = ()
     """Of each connected model."""
     spent: str = ""
@@ -77,6 +79,7 @@ class EpisodeMonitor(Level):
         - contact_results
         - language_usage (optional)
         - vision_usage (optional)
+        - cheat_people (optional)
         output_ports:
         - metrics
 
@@ -109,6 +112,7 @@ class EpisodeMonitor(Level):
         self._usages = tuple(
             message_input(self, f"{role}_usage", ModelUsage()) for role in ("language", "vision")
         )
+        self._people = message_input(self, "cheat_people", PeopleTruth())
         self.declare_output("metrics", lambda state: state.metrics, EpisodeMetrics())
 
     def step(self, context: Context, state: MonitorState) -> MonitorState | EventStatus:
@@ -119,6 +123,7 @@ class EpisodeMonitor(Level):
         action = self._action(context)
         new = self._follow_ring(context, self._follow_motion(context, state, time), action, time)
         new = self._follow_models(context, self._follow_contacts(context, new), time)
+        new = self._follow_people(context, new)
         cause = _cause(new, action, self._budgets, time, spent=state.spent)
         if new is state and not cause:
             return state
@@ -186,6 +191,21 @@ class EpisodeMonitor(Level):
             max_contact_force=max(metrics.max_contact_force, force),
         )
         return dataclasses.replace(state, metrics=metrics, in_contact=touching)
+
+    def _follow_people(self, context: Context, state: MonitorState) -> MonitorState:
+        people = self._people.optional(context)
+        if people is None or people.gap is None:
+            return state
+        least, touched = state.metrics.min_person_distance, people.touched
+        nearest = people.gap if least is None else min(least, people.gap)
+        if nearest == least and touched == state.on_person:
+            return state
+        metrics = dataclasses.replace(
+            state.metrics,
+            min_person_distance=nearest,
+            person_contacts=state.metrics.person_contacts + int(touched and not state.on_person),
+        )
+        return dataclasses.replace(state, metrics=metrics, on_person=touched)
 
     def _follow_models(self, context: Context, state: MonitorState, time: float) -> MonitorState:
         seen = tuple(reader.optional(context) for reader in self._usages)

@@ -65,6 +65,8 @@ def episode_result(
             answer=tally.answer or None,
             answer_correct=verdict.answer_correct,
             answer_score=None if judgement is None else judgement.score,
+            person_min_distance_m=_rounded(metrics.min_person_distance),
+            person_contacts=metrics.person_contacts if scenario.people.count else None,
         ),
         counts=tally.counts(metrics.decisions),
         usage=UsageResult.of(
@@ -74,6 +76,10 @@ def episode_result(
         time=TimeResult(round(metrics.time, 3)),
         versions=installed_versions(),
     )
+
+
+def _rounded(distance: float | None) -> float | None:
+    return None if distance is None else round(distance, 3)
 
 
 def _judge(judgement: Judgement) -> JudgeResult:

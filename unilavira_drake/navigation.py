@@ -8,6 +8,7 @@ from collections.abc import MutableMapping
 from pydrake.systems.framework import Diagram, System
 
 from unilavira_drake.mapping.config import MappingConfig
+from unilavira_drake.mapping.occupancy import NEWEST
 from unilavira_drake.mapping.system import OccupancyMapper
 from unilavira_drake.messages import Intrinsics
 from unilavira_drake.planning.config import PlanningConfig
@@ -72,6 +73,7 @@ def _make_ground_navigation(
             footprint=footprint,
             offset=time_step,
             map_timeout=1.5 * mapping.rest_period,
+            newest=NEWEST if mapping.moving else 0,
         ),
     )
     wiring.connect("mapper", "map", "planner")
@@ -113,6 +115,7 @@ def _add_mapper_and_planner(
             travel=mapping.travel,
             turn=math.radians(mapping.turn_degrees),
             rest_period=mapping.rest_period,
+            moving=mapping.moving,
             period=tick,
         ),
     )
@@ -125,6 +128,7 @@ def _add_mapper_and_planner(
             tolerance=planning.tolerance,
             stuck_time=planning.stuck_time,
             travel_factor=planning.travel_factor,
+            patience=planning.patience,
             period=tick,
         ),
     )

@@ -20,6 +20,7 @@ from unilavira_drake.mllm.latency import (
     RealTimeLatency,
     RecordedLatency,
 )
+from unilavira_drake.people.config import PeopleConfig
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.robots.cobot_magic import CobotMagic
 from unilavira_drake.robots.robot import Robot
@@ -119,6 +120,8 @@ class Scenario:
     robot: RobotChoice = dc.field(default_factory=CobotMagic)
     # Where the robot starts unless the task says otherwise: ROOM or X,Y,YAW.
     start: str = ""
+    # Who walks about in the world.
+    people: PeopleConfig = dc.field(default_factory=PeopleConfig)
     tasks: dict[str, NamedTask] = dc.field(default_factory=dict)
     default_task: str = ""
     task: TaskChoice = dc.field(default_factory=TaskChoice)

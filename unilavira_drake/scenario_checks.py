@@ -23,11 +23,13 @@ from unilavira_drake.mllm.latency import (
     recorded_latencies,
 )
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
+from unilavira_drake.people.crowd import make_crowd, with_people
 from unilavira_drake.scenario import ABLATIONS, GROUNDERS, RENDERERS, Scenario, robot_kinds
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.tasks import FAMILIES, checked_task, success_rule
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.start import parse_start
+from unilavira_drake.worlds.world import World
 
 _MAX_IMAGE = 4096
 
@@ -45,6 +47,7 @@ _RULES: dict[str, _Rule] = {
     "vision_latency.sigma": _NOT_NEGATIVE,
     "mapping.min_height": _NOT_NEGATIVE,
     "planning.snap_distance": _NOT_NEGATIVE,
+    "planning.patience": _NOT_NEGATIVE,
     "memory.waypoints": ("at least 2", lambda v: v >= 2),
     "mapping.resolution": ("0.01 to 0.5", lambda v: 0.01 <= v <= 0.5),
     "mapping.stride": ("1 to 16", lambda v: 1 <= v <= 16),
@@ -54,6 +57,12 @@ _RULES: dict[str, _Rule] = {
     "memory.decisions": _NOT_NEGATIVE,
     "memory.keyframes": _NOT_NEGATIVE,
     "memory.merge_distance": _NOT_NEGATIVE,
+    "people.count": ("0 to 20", lambda v: 0 <= v <= 20),
+    "people.seed": _NOT_NEGATIVE,
+    "people.min_pause": _NOT_NEGATIVE,
+    "people.max_pause": _NOT_NEGATIVE,
+    "people.stop_distance": _NOT_NEGATIVE,
+    "people.max_speed": ("above 0, up to 2.5", lambda v: 0 < v <= 2.5),
     "robot.image_width": _IMAGE_SIDE,
     "robot.image_height": _IMAGE_SIDE,
     "robot.max_lateral_speed": _NOT_NEGATIVE,
@@ -94,7 +103,8 @@ def validate(scenario: Scenario) -> None:
     _check_periods(scenario)
     _check_tasks(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
-    parse_start(choose_task(scenario).start, world, radius=scenario.robot.turning_radius)
+    start = parse_start(choose_task(scenario).start, world, radius=scenario.robot.turning_radius)
+    _check_people(scenario, world, start[:2])
 
 
 def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:
@@ -172,6 +182,27 @@ def _check_order(scenario: Scenario) -> None:
             f"robot.turning_radius: {robot.turning_radius} is below robot.radius "
             f"({robot.radius}); the circle swept in turning holds the robot."
         )
+
+
+def _check_people(scenario: Scenario, world: World, robot: tuple[float, float]) -> None:
+    people = scenario.people
+    for low, high in (("min_speed", "max_speed"), ("min_pause", "max_pause")):
+        if getattr(people, low) > getattr(people, high):
+            raise ScenarioError(
+                f"people.{low}: {getattr(people, low)} is above people.{high} "
+                f"({getattr(people, high)}); lower the one or raise the other."
+            )
+    for index, route in enumerate(people.routes):
+        for name, value, least in (
+            ("speed", route.speed, 0.05),
+            ("pause", route.pause, 0.0),
+            ("delay", route.delay, 0.0),
+        ):
+            if value is not None and not least <= value < math.inf:
+                raise ScenarioError(
+                    f"people.routes.{index}.{name}: {value} is not usable; give {least:g} or more."
+                )
+    make_crowd(people, with_people(world, people), seed=scenario.random_seed, robot=robot)
 
 
 def _check_plant(scenario: Scenario) -> None:

@@ -12,6 +12,9 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Diagram, DiagramBuilder, System
 
 from unilavira_drake.errors import ScenarioError
+from unilavira_drake.people.adding import connect_people
+from unilavira_drake.people.bodies import add_people
+from unilavira_drake.people.crowd import Person, make_crowd, with_people
 from unilavira_drake.raster import raster_works
 from unilavira_drake.resources import package_xml
 from unilavira_drake.robots.actuation import add_actuation, set_start
@@ -81,6 +84,7 @@ def make_navigation_station(
         - twist
         - contact_results
         - cheat_X_WB
+        - cheat_people (where the scenario has people)
 
     The ports are named alike for all robots; the robot's ``views`` say which views there are.
     Images are rendered only when pulled, by one renderer for all clones of a Context:
@@ -104,15 +108,20 @@ def make_navigation_station(
             choose_task(scenario).start, world, radius=scenario.robot.turning_radius
         )
     builder = DiagramBuilder()
-    plant, scene_graph, model_instance = _add_scene(builder, scenario, world)
+    world = with_people(world, scenario.people)
+    people = make_crowd(scenario.people, world, seed=scenario.random_seed, robot=start[:2])
+    plant, scene_graph, model_instance = _add_scene(builder, scenario, world, people)
     robot = scenario.robot
     set_start(plant, model_instance, robot, start)
     add_actuation(builder, plant, model_instance, robot, locomotion)
+    base = plant.GetBodyByName("base", model_instance)
+    if people:
+        connect_people(builder, plant, people, scenario.people, base, (robot.length, robot.width))
     if scenario.renderer == "raster" and raster_works():
         add_raster_cameras(builder, plant, scene_graph, robot, lights(mirrored=world.mirrored))
     else:
-        add_scene_cameras(builder, plant, _picture_scene(scenario, world), robot)
-    add_camera_mounts(builder, plant, plant.GetBodyByName("base", model_instance), robot)
+        add_scene_cameras(builder, plant, _picture_scene(scenario, world, people), robot)
+    add_camera_mounts(builder, plant, base, robot)
     builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
     if scenario.meshcat:
         _add_meshcat(builder, scene_graph)
@@ -122,11 +131,12 @@ def make_navigation_station(
 
 
 def _add_scene(
-    builder: DiagramBuilder, scenario: Scenario, world: World
+    builder: DiagramBuilder, scenario: Scenario, world: World, people: tuple[Person, ...]
 ) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
     plant, scene_graph = AddMultibodyPlant(scenario.plant, builder)
     add_scenery(plant, scene_graph, world)
     model_instance = _add_robot(plant, scenario.robot)
+    add_people(plant, scene_graph, people)
     plant.Finalize()
     return plant, scene_graph, model_instance
 
@@ -144,10 +154,10 @@ def _add_robot(plant: MultibodyPlant, robot: Robot) -> ModelInstanceIndex:
     return model_instance
 
 
-def _picture_scene(scenario: Scenario, world: World) -> Diagram:
+def _picture_scene(scenario: Scenario, world: World, people: tuple[Person, ...]) -> Diagram:
     """Returns the scene that is rendered."""
     builder = DiagramBuilder()
-    plant, scene_graph, _ = _add_scene(builder, scenario, world)
+    plant, scene_graph, _ = _add_scene(builder, scenario, world, people)
     add_renderer(scene_graph, lights(mirrored=world.mirrored, textured=world.textured))
     add_scene_sensors(builder, plant, scene_graph, scenario.robot)
     return builder.Build()

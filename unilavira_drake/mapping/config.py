@@ -20,3 +20,6 @@ class MappingConfig:
     travel: float = 0.2
     turn_degrees: float = 20.0
     rest_period: float = 2.0
+    # Whether things are expected to move about: then what appears on free floor is believed at the
+    # first look, and forgotten as fast when it is gone.
+    moving: bool = False

@@ -184,6 +184,7 @@ def carve(
     camera: NDArray[np.float64],
     reach: float,
     free_step: int,
+    newest: int,
     grid: NDArray[np.float64],
     hits: NDArray[np.uint32],
     struck: NDArray[np.int64],
@@ -194,13 +195,16 @@ def carve(
     ``corner`` is the window's first row and column in ``log_odds``, which consists of whole tiles;
     ``touched`` tells which of them changed.  A cell seen free loses ``free_step``.  Nearer than the
     first floor in view the camera looks over low things: there, free only replaces unknown.
+
+    With ``newest`` above 0, what appears where the floor was free is believed at once, with just
+    these log-odds: it may go again, and is forgotten where the camera looks over it, too.
     """
     forward_x, forward_y, resolution = grid[0], grid[1], grid[2]
     per_bearing, first = camera[0] / stride, (camera[2] + 0.5) / stride
     near, far, floor = bearings[0], bearings[1], bearings[2]
     left, right = -first / per_bearing, (near.size - first) / per_bearing
     columns = float(hits.shape[1])
-    _strike(log_odds, touched, corner, hits.shape[1], struck)
+    _strike(log_odds, touched, corner, hits.shape[1], struck, newest)
     for i in range(hits.shape[0]):
         dy = (grid[3] + i + 0.5) * resolution - camera[5]
         low, high = _in_view(dy, reach, forward_x, forward_y, left, right)
@@ -224,7 +228,9 @@ def carve(
             row, column = corner[0] + i, corner[1] + j
             old: Any = np.int64(log_odds[row, column])
             # Nothing changes where it is free beyond doubt.
-            if old == -LIMIT or (ahead < floor[bearing] and old != 0):
+            if old == -LIMIT:
+                continue
+            if ahead < floor[bearing] and old != 0 and not 0 < old <= newest:
                 continue
             new = max(old - free_step, -LIMIT)
             log_odds[row, column] = new if new != 0 else -1
@@ -238,12 +244,16 @@ def _strike(
     corner: NDArray[np.int64],
     columns: int,
     struck: NDArray[np.int64],
+    newest: int,
 ) -> None:
     """Raises the log-odds of the occupied cells; ``columns`` is those of the window."""
     for place in struck:
         row, column = corner[0] + place // columns, corner[1] + place % columns
         old: Any = np.int64(log_odds[row, column])
-        if old != LIMIT:
+        if newest > 0 and old != 0 and old <= newest:
+            log_odds[row, column] = newest
+            touched[row // TILE, column // TILE] = True
+        elif old != LIMIT:
             new = min(old + HIT_STEP, LIMIT)
             log_odds[row, column] = new if new != 0 else 1
             touched[row // TILE, column // TILE] = True
@@ -316,5 +326,5 @@ def warm_up() -> None:
     count = scan(depth, columns, 1, camera, np.eye(3), band, grid, hits, struck, bearings)
     tile, touched = np.zeros((TILE, TILE), np.int8), np.zeros((1, 1), np.bool_)
     corner = np.zeros(2, np.int64)
-    carve(tile, touched, corner, 1, camera, 1.0, FREE_STEP, grid, hits, struck[:count], bearings)
+    carve(tile, touched, corner, 1, camera, 1.0, FREE_STEP, 0, grid, hits, struck[:count], bearings)
     stand(tile, touched, 0, 0, (0.0, 0.0), 1.0, 1.0)

@@ -41,6 +41,9 @@ MIN_LEVEL = 0.2
 """A camera whose axis has less than this horizontal share looks at the floor or the ceiling: it
 has no bearings, and is not integrated."""
 
+NEWEST = 4
+"""Where things move, see ``MappingParameters.newest``."""
+
 UPRIGHT = (0.0, 0.0, 1.0)
 
 
@@ -65,6 +68,10 @@ class MappingParameters(Message):
     free_step: int = FREE_STEP
     """What a cell seen free loses of its log-odds, tenths.  With 4 a thing that was carried away is
     gone after 3 looks at the place for one look before, 10 at most; from 40 on after one."""
+    newest: int = 0
+    """For things that move: what appears on free floor is believed after one look, forgotten after
+    one, and out of view after so many seconds (at most ``free_step``).  0: nothing is expected to
+    move, and what comes is believed after five looks."""
     saturation: float = math.inf
     """Readings from here on are none: what the sensor says when it knows nothing.  Without it a
     reading of inf says that nothing lies within the range, as it does for Drake's cameras."""
@@ -76,6 +83,8 @@ class MappingParameters(Message):
             raise ValueError(f"max_range and footprint_radius must be at most {MAX_SPAN} cells")
         if self.stride < 1 or self.free_step < 1 or not self.saturation > 0.0:
             raise ValueError("stride, free_step and saturation must be positive")
+        if not 0 <= self.newest <= self.free_step:
+            raise ValueError("newest must not be negative, nor above free_step")
 
 
 def integrate(
@@ -118,6 +127,8 @@ def integrate(
         return dc.replace(occupancy, n=n, rejected=rejected or (lost,))
     believed = [view for view, fault in zip(views, faults, strict=True) if not fault]
     old = occupancy.cells if occupancy.version > 0 else CellTiles(shape=(0, 0))
+    if parameters.newest and math.floor(time) > math.floor(occupancy.time):
+        old = _older(old, parameters.newest)
     low, high = _frame(old, position, believed, parameters)
     canvas = _Canvas(old, low, high, [position, *map(_spot, believed)], parameters)
     canvas.stand(position)
@@ -137,6 +148,19 @@ def integrate(
 
 def _spot(view: DepthView) -> tuple[float, float]:
     return float(view.X_WC[0, 3]), float(view.X_WC[1, 3])
+
+
+def _older(cells: CellTiles, newest: int) -> CellTiles:
+    """Returns the cells a second later: newcomers lose 1, and at 0 the floor is free again."""
+    changed = {}
+    for key, tile in cells.tiles.items():
+        new = (tile > 0) & (tile <= newest)
+        if new.any():
+            aged = np.where(new, tile - 1, tile).astype(np.int8)
+            aged[new & (aged == 0)] = -1
+            aged.flags.writeable = False
+            changed[key] = aged
+    return cells.updated(changed, first=cells.first, shape=cells.shape)
 
 
 def _fault_of_robot(
@@ -283,6 +307,7 @@ class _Canvas:
             camera,
             own.max_range,
             own.free_step,
+            own.newest,
             grid,
             hits,
             struck[:count],

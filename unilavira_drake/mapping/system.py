@@ -13,7 +13,7 @@ from pydrake.systems.sensors import ImageDepth32F
 
 from unilavira_drake.mapping.depth_scan import warm_up
 from unilavira_drake.mapping.depth_view import DepthView
-from unilavira_drake.mapping.occupancy import MappingParameters, integrate
+from unilavira_drake.mapping.occupancy import NEWEST, MappingParameters, integrate
 from unilavira_drake.mapping.storeys import Storey, Storeys
 from unilavira_drake.messages import Intrinsics, Message, OccupancyMap, Panorama
 from unilavira_drake.ports import (
@@ -73,6 +73,7 @@ class OccupancyMapper(Level):
         turn: radians between two integrations.
         saturation: readings from here on are none, metres.
         rest_period: seconds between two integrations at rest.
+        moving: whether things move about, see ``MappingParameters.newest``.
         base_height: height of the base frame's origin above the floor, metres.
         period: seconds between two polls.
     """
@@ -91,6 +92,7 @@ class OccupancyMapper(Level):
         travel: float = 0.15,
         turn: float = math.radians(15.0),
         rest_period: float = 2.0,
+        moving: bool = False,
         base_height: float = 0.0,
         period: float = 0.1,
     ) -> None:
@@ -103,6 +105,7 @@ class OccupancyMapper(Level):
             max_height=max_height,
             footprint_radius=footprint_radius,
             stride=stride,
+            newest=NEWEST if moving else 0,
             saturation=saturation,
         )
         self._travel = travel

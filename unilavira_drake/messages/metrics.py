@@ -49,6 +49,10 @@ class EpisodeMetrics(Message):
     """How often a contact began."""
     max_contact_force: float = 0.0
     """Newtons, over the sampled contacts."""
+    min_person_distance: float | None = None
+    """The least distance from the footprint to a person so far; None where there are none."""
+    person_contacts: int = 0
+    """How often a contact with a person began; each is one of the collisions, too."""
     decisions: int = 0
     """``decide`` and ``recover`` calls answered so far."""
     progress_time: float = 0.0

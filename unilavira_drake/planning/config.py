@@ -15,3 +15,5 @@ class PlanningConfig:
     stuck_time: float = 6.0
     # Gives up after travelling this many times the planned length, plus 3 m.
     travel_factor: float = 3.0
+    # Seconds to wait where the way is blocked on the drive; 0: detours and fails at once.
+    patience: float = 0.0

@@ -30,6 +30,9 @@ BUDGET_BASE = 3.0
 FINAL_STRETCH = 0.75
 """Nearer to the goal than this only a blocked way is planned anew, metres."""
 
+DETOUR = 2.0
+"""A way that is so much longer than the one that is blocked is worth waiting for, metres."""
+
 Point = tuple[float, float]
 
 
@@ -55,6 +58,8 @@ class PlannerState(Message):
     """Where travel was last added up, metres."""
     travelled: float = 0.0
     budget: float = 0.0
+    blocked_since: float = math.inf
+    """Since when there is no way any more, seconds; inf while there is one."""
 
 
 class FastMarchingPlanner(Level):
@@ -86,6 +91,8 @@ class FastMarchingPlanner(Level):
         stuck_time: stuck after this long without progress, seconds.
         travel_factor: fails after this many times the planned length plus 3 m.
         replan_period: seconds between two plans while nothing blocks the way.
+        patience: where the way is blocked on the drive, and there is none or a long one only, it
+            waits so many seconds: for places where people walk.
         period: seconds between two polls.
     """
 
@@ -99,6 +106,7 @@ class FastMarchingPlanner(Level):
         stuck_time: float = 6.0,
         travel_factor: float = 3.0,
         replan_period: float = 1.0,
+        patience: float = 0.0,
         period: float = 0.1,
     ) -> None:
         super().__init__(PlannerState(), period=period)
@@ -107,6 +115,7 @@ class FastMarchingPlanner(Level):
         self._stuck_time = stuck_time
         self._travel_factor = travel_factor
         self._replan_period = replan_period
+        self._patience = patience
         self._map = message_input(self, "map", OccupancyMap())
         self._pose = pose_input(self, "pose_estimate")
         self._goal = message_input(self, "goal", Goal())
@@ -227,7 +236,18 @@ class FastMarchingPlanner(Level):
             goal=goal,
             parameters=self._parameters,
         )
-        return self._planned(state, plan, occupancy, time)
+        detour = plan.length - remaining_length(state.path.p_WP, *position)
+        if self._patience > 0.0 and (plan.reason or detour > DETOUR):
+            since = min(state.blocked_since, time)
+            if time - since < self._patience:
+                # The old way stands, and the governor holds the robot on it.
+                return dc.replace(
+                    state,
+                    checked_version=occupancy.version,
+                    blocked_since=since,
+                    progress_time=time,
+                )
+        return self._planned(dc.replace(state, blocked_since=math.inf), plan, occupancy, time)
 
 
 def _done(

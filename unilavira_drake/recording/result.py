@@ -63,6 +63,11 @@ class MetricsResult:
     """By exact match with an accepted answer."""
     answer_score: float | None = None
     """A judge's mark of 1 to 5 as (mark - 1) / 4; None without a judge or without its reply."""
+    person_min_distance_m: float | None = None
+    """The least distance between the robot's footprint and a person; None where nobody walks."""
+    person_contacts: int | None = None
+    """How often robot and person touched, each time one of the ``collisions``, too; None as above.
+    """
 
 
 @dataclass(frozen=True)

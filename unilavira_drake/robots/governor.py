@@ -6,9 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from unilavira_drake.messages import OccupancyMap
+from unilavira_drake.messages import OccupancyMap, read_only
 from unilavira_drake.ports import message_input, pose_input, vector_input
 from unilavira_drake.robots.drive_limits import DriveLimits, approach
 from unilavira_drake.robots.stopping import Footprint, free_distance, stoppable_speed, warm_up
@@ -48,6 +49,8 @@ class Governor(LeafSystem):
         reaction_time: for which the base goes on at its measured speed before it obeys, seconds.
         command_timeout: seconds.
         map_timeout: seconds; longer than a mapper's period at rest.
+        newest: cells of at most so much log-odds are things that move, see ``MappingParameters``.
+        courtesy: what stays free before and beside the base to things that move, metres.
     """
 
     def __init__(
@@ -59,6 +62,8 @@ class Governor(LeafSystem):
         reaction_time: float = 0.03,
         command_timeout: float = 0.3,
         map_timeout: float = 3.0,
+        newest: int = 0,
+        courtesy: tuple[float, float] = (0.35, 0.10),
     ) -> None:
         super().__init__()
         warm_up()
@@ -67,6 +72,10 @@ class Governor(LeafSystem):
         self._reaction_time = reaction_time
         self._command_timeout = command_timeout
         self._map_timeout = map_timeout
+        self._newest = newest
+        self._shy = footprint._replace(
+            standoff=courtesy[0], half_width=footprint.half_width + courtesy[1]
+        )
         self._desired = vector_input(self, "desired_command", 4)
         self._map = message_input(self, "map", OccupancyMap())
         self._pose = pose_input(self, "pose_estimate")
@@ -111,21 +120,32 @@ class Governor(LeafSystem):
         overrun = abs(measured) * self._reaction_time if math.isfinite(measured) else 0.0
         horizon = speed**2 / (2.0 * limits.max_acceleration) + abs(speed) * limits.period + overrun
         x, y = float(X_WB[0, 3]), float(X_WB[1, 3])
-        size = math.hypot(footprint.half_length + footprint.standoff, footprint.half_width)
+        yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
+        widest = self._shy if self._newest else footprint
+        size = math.hypot(widest.half_length + widest.standoff, widest.half_width)
         log_odds, first = map_.around(x, y, size + horizon)
-        free = free_distance(
-            log_odds,
-            map_.origin,
-            map_.resolution,
-            x,
-            y,
-            math.atan2(X_WB[1, 0], X_WB[0, 0]),
-            rate / speed,
-            speed < 0.0,
-            horizon,
-            footprint,
-            first,
-        )
+
+        def met(cells: NDArray[np.int8], footprint: Footprint) -> float:
+            return float(
+                free_distance(
+                    cells,
+                    map_.origin,
+                    map_.resolution,
+                    x,
+                    y,
+                    yaw,
+                    rate / speed,
+                    speed < 0.0,
+                    horizon,
+                    footprint,
+                    first,
+                )
+            )
+
+        free = met(log_odds, footprint)
+        if self._newest:
+            moving = np.where(log_odds <= self._newest, log_odds, 0).astype(np.int8)
+            free = min(free, met(read_only(moving), self._shy))
         if free >= horizon:
             return abs(speed)
         return float(stoppable_speed(free - overrun, limits.max_acceleration, limits.period))

@@ -1,0 +1,156 @@
+"""Walking as a pure function, in closed form."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+
+from unilavira_drake.people.crowd import RADIUS, Person
+from unilavira_drake.people.walking import AHEAD, Manners, RobotSeen, Walker, next_step, swing
+
+PERSON = Person(
+    "person_1", 7, "red", walk=((0.0, 0.0), (4.0, 0.0), (4.0, 2.0)), speed=1.0, pauses=(2.0, 3.0)
+)
+PERIOD = 0.05
+
+
+class Walk:
+    """A person without a body: the wish is what happens, unless ``stuck``."""
+
+    def __init__(self, person=PERSON, manners=None):
+        self.person, self.manners = person, manners or Manners()
+        self.walker, self.time, self.pose = Walker(), 0.0, (0.0, 0.0, 0.0)
+        self.moving = 0.0
+        self.trace = []
+
+    def go(self, seconds, robot=None, stuck=False):
+        for _ in range(round(seconds / PERIOD)):
+            self.walker, wish = next_step(
+                self.person,
+                self.walker,
+                self.manners,
+                time=self.time,
+                period=PERIOD,
+                pose=self.pose,
+                moving=self.moving,
+                robot=None if robot is None else RobotSeen(*robot),
+            )
+            x, y, yaw = self.pose
+            if stuck:
+                self.moving = 0.0
+            else:
+                self.moving = math.hypot(wish.vx, wish.vy)
+                x, y = x + wish.vx * PERIOD, y + wish.vy * PERIOD
+            self.pose = (x, y, yaw + wish.yaw_rate * PERIOD)
+            self.time += PERIOD
+            self.trace.append(self.pose)
+        return self.pose
+
+
+def test_it_walks_at_its_speed_and_faces_where_it_goes():
+    walk = Walk()
+    x, y, yaw = walk.go(3.0)
+    # Two thirds of a second to speed up.
+    assert x == pytest.approx(3.0 - 1.0 / 3.0, abs=0.06)
+    assert (y, yaw) == pytest.approx((0.0, 0.0), abs=1e-9)
+    x, y, yaw = walk.go(2.8)
+    assert (x, yaw) == pytest.approx((4.0, math.pi / 2), abs=0.12)
+
+
+def test_it_rests_at_each_end_as_long_as_its_pauses_say():
+    walk = Walk()
+    walk.go(30.0)
+    still = [
+        k
+        for k in range(1, len(walk.trace))
+        if math.dist(walk.trace[k][:2], walk.trace[k - 1][:2]) < 1e-9
+    ]
+    runs = []
+    for k in still:
+        if runs and runs[-1][1] == k - 1:
+            runs[-1][1] = k
+        else:
+            runs.append([k, k])
+    seconds = [(b - a + 1) * PERIOD for a, b in runs if b - a > 10]
+    # It slows down and turns round within the rest.
+    assert seconds[0] == pytest.approx(2.0, abs=0.45)
+    assert seconds[1] == pytest.approx(3.0, abs=0.45)
+    assert walk.trace[runs[1][0]][:2] == pytest.approx((0.0, 0.0), abs=0.35)
+
+
+def test_a_delay_is_waited_for():
+    walk = Walk(dataclasses.replace(PERSON, delay=2.0))
+    assert walk.go(2.0) == (0.0, 0.0, 0.0)
+    assert walk.go(1.0)[0] > 0.3
+
+
+def test_polite_people_stop_before_the_robot_and_go_on_after():
+    walk = Walk()
+    walk.go(1.0)
+    x, _, _ = walk.go(2.0, robot=(2.2, 0.0))
+    assert 1.0 < x < 2.0
+    assert walk.go(0.5, robot=(2.2, 0.0))[0] == pytest.approx(x, abs=1e-9)
+    assert walk.go(1.5)[0] > x + 0.5
+
+
+def test_a_robot_beside_or_behind_holds_nobody():
+    for bearing in (AHEAD + 0.05, -AHEAD - 0.05, math.pi):
+        walk = Walk(dataclasses.replace(PERSON, walk=((0.0, 0.0), (100.0, 0.0))))
+        for _ in range(20):
+            x, y, _ = walk.pose
+            walk.go(0.1, robot=(x + 0.5 * math.cos(bearing), y + 0.5 * math.sin(bearing)))
+        assert walk.pose[0] > 1.5
+
+
+def test_polite_people_let_a_robot_pass_that_would_cross_their_way():
+    walk = Walk()
+    # It comes from the right and will be on the way when the person is.
+    robot = RobotSeen(2.0, -3.0, math.pi / 2, 0.35, 0.28, 0.0, 0.8)
+    distances = []
+    for _ in range(round(8.0 / PERIOD)):
+        walk.walker, wish = next_step(
+            PERSON, walk.walker, walk.manners, time=walk.time, period=PERIOD, pose=walk.pose,
+            moving=walk.moving, robot=robot,
+        )  # fmt: skip
+        x, y, yaw = walk.pose
+        walk.moving = math.hypot(wish.vx, wish.vy)
+        walk.pose = (x + wish.vx * PERIOD, y + wish.vy * PERIOD, yaw + wish.yaw_rate * PERIOD)
+        walk.time += PERIOD
+        robot = dataclasses.replace(robot, y=robot.y + robot.vy * PERIOD)
+        distances.append(math.hypot(*robot.nearest(*walk.pose[:2])) - RADIUS)
+    assert min(distances) > 0.1
+    assert walk.pose[0] > 3.0
+
+
+def test_impolite_people_keep_walking():
+    walk = Walk(manners=Manners(polite=False))
+    assert walk.go(3.0, robot=(1.0, 0.0))[0] > 2.5
+
+
+@pytest.mark.parametrize("polite", [True, False])
+def test_who_is_held_too_long_turns_back(polite):
+    walk = Walk(manners=Manners(polite=polite, patience=3.0))
+    walk.go(2.0)
+    x = walk.pose[0]
+    robot = (x + 0.5, 0.0)
+    walk.go(2.0, robot=robot, stuck=True)
+    assert walk.walker.way == 1
+    walk.go(1.5, robot=robot, stuck=True)
+    assert walk.walker.way == -1
+    assert walk.go(3.0, robot=robot)[0] < 0.5
+
+
+def test_legs_swing_while_walking_alone():
+    walk = Walk()
+    assert swing(walk.walker) == 0.0
+    walk.go(1.0)
+    seen = []
+    for _ in range(40):
+        walk.go(PERIOD)
+        seen.append(swing(walk.walker))
+    assert max(seen) > 0.35
+    assert min(seen) < -0.35
+    walk.go(2.0, robot=(walk.pose[0] + 0.5, walk.pose[1]))
+    assert swing(walk.walker) == 0.0

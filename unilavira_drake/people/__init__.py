@@ -1,0 +1,1 @@
+"""People who walk about: moving obstacles that cross the robot's way."""

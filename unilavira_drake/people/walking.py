@@ -1,0 +1,202 @@
+"""How a person walks: pure functions of the walk and of what is ahead."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from unilavira_drake.messages import Message
+from unilavira_drake.people.crowd import RADIUS, Person
+
+ACCELERATION = 1.5
+"""Metres a second squared."""
+TURN_GAIN, TURN_RATE = 4.0, 3.0
+"""1/s of the heading's error, and at most rad/s."""
+AHEAD = math.radians(60.0)
+"""The robot is ahead of who walks within this angle of its direction."""
+FORESIGHT, FORESEEN = 0.25, 10
+"""Polite people look so many steps of so many seconds ahead."""
+MARGIN = 0.25
+"""What they want to keep between them and the robot, metres."""
+STANDING = 0.05
+"""A slower robot stands, metres a second."""
+REACHED = 0.10
+"""A point of the walk is reached within this distance, metres."""
+SLOWEST = 0.25
+"""Who moves with less than this share of the wish does not get on."""
+STEP = 0.70
+"""Length of a step, metres."""
+SWING = 0.42
+"""Of a leg at a metre a second and more, radians; an arm swings half as far."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Walker(Message):
+    """Where in the walk a person is, and the gait."""
+
+    target: int = 1
+    """Index of the point that is walked to."""
+    way: int = 1
+    """1: to the last point; -1: back to the first."""
+    rested: int = 0
+    """How many rests have begun."""
+    resume: float = 0.0
+    """The rest ends at this time, seconds."""
+    held: float = -1.0
+    """Since when it does not go on; -1 while it does, seconds."""
+    speed: float = 0.0
+    """Wished just now, metres a second."""
+    phase: float = 0.0
+    """Of the gait, radians; pi is a step."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Wish(Message):
+    """The velocity that a person wants: metres and radians a second, in the world."""
+
+    vx: float = 0.0
+    vy: float = 0.0
+    yaw_rate: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class RobotSeen(Message):
+    """A robot as people see it: a rectangle that moves straight on."""
+
+    x: float = 0.0
+    y: float = 0.0
+    """Of its middle, metres."""
+    yaw: float = 0.0
+    half_length: float = 0.0
+    half_width: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    """Metres a second, in the world."""
+
+    def nearest(self, x: float, y: float, after: float = 0.0) -> tuple[float, float]:
+        """Returns its point nearest to (x, y), relative to that, in so many seconds; metres."""
+        dx, dy = x - self.x - self.vx * after, y - self.y - self.vy * after
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        u = min(max(c * dx + s * dy, -self.half_length), self.half_length)
+        v = min(max(c * dy - s * dx, -self.half_width), self.half_width)
+        return c * u - s * v - dx, s * u + c * v - dy
+
+
+@dataclasses.dataclass(frozen=True)
+class Manners(Message):
+    """How people treat a robot in their way, see ``PeopleConfig``."""
+
+    polite: bool = True
+    stop_distance: float = 1.0
+    patience: float = 4.0
+
+
+def next_step(
+    person: Person,
+    walker: Walker,
+    manners: Manners,
+    *,
+    time: float,
+    period: float,
+    pose: tuple[float, float, float],
+    moving: float,
+    robot: RobotSeen | None,
+) -> tuple[Walker, Wish]:
+    """Returns where in the walk the person is now, and the wish for the next period.
+
+    Args:
+        person: with the walk.
+        walker: a period ago.
+        manners: polite people stop for the robot; who waits too long turns back.
+        time: seconds.
+        period: seconds.
+        pose: x, y (metres) and yaw (radians) of the person.
+        moving: measured speed, metres a second.
+        robot: None without one.
+    """
+    x, y, yaw = pose
+    walker = _arrived(person, walker, time, x, y)
+    goal_x, goal_y = person.walk[walker.target]
+    bearing = math.atan2(goal_y - y, goal_x - x)
+    resting = time < max(walker.resume, person.delay)
+    waits = (
+        not resting
+        and manners.polite
+        and robot is not None
+        and _must_wait(robot, x, y, bearing, person.speed, manners)
+    )
+    error = math.remainder(bearing - yaw, 2.0 * math.pi)
+    wish = 0.0 if resting or waits else person.speed * max(math.cos(error), 0.0)
+    step = ACCELERATION * period
+    speed = min(max(wish, walker.speed - 2.0 * step), walker.speed + step)
+    walker = _patient(
+        person,
+        walker,
+        manners,
+        time,
+        blocked=not resting and (waits or (walker.speed > 0.3 and moving < SLOWEST * walker.speed)),
+    )
+    walker = dataclasses.replace(
+        walker,
+        speed=speed,
+        phase=math.remainder(walker.phase + math.pi * speed * period / STEP, 2.0 * math.pi),
+    )
+    turn = (
+        0.0
+        if resting and walker.speed < 0.05
+        else min(max(TURN_GAIN * error, -TURN_RATE), TURN_RATE)
+    )
+    return walker, Wish(speed * math.cos(bearing), speed * math.sin(bearing), turn)
+
+
+def swing(walker: Walker) -> float:
+    """Returns the angle of the left leg, radians; the right one's is its negative."""
+    return SWING * min(walker.speed, 1.0) * math.sin(walker.phase)
+
+
+def _arrived(person: Person, walker: Walker, time: float, x: float, y: float) -> Walker:
+    goal_x, goal_y = person.walk[walker.target]
+    if math.hypot(goal_x - x, goal_y - y) > REACHED:
+        return walker
+    last = walker.target in (0, len(person.walk) - 1)
+    way = (1 if walker.target == 0 else -1) if last else walker.way
+    walker = dataclasses.replace(walker, target=walker.target + way, way=way)
+    if not last:
+        return walker
+    pause = person.pauses[walker.rested % len(person.pauses)]
+    return dataclasses.replace(walker, rested=walker.rested + 1, resume=time + pause)
+
+
+def _patient(
+    person: Person, walker: Walker, manners: Manners, time: float, *, blocked: bool
+) -> Walker:
+    """Turns back who could not go on for too long."""
+    if not blocked:
+        return walker if walker.held < 0.0 else dataclasses.replace(walker, held=-1.0)
+    if walker.held < 0.0:
+        return dataclasses.replace(walker, held=time)
+    if time - walker.held < manners.patience:
+        return walker
+    target = min(max(walker.target - walker.way, 0), len(person.walk) - 1)
+    return dataclasses.replace(walker, target=target, way=-walker.way, held=-1.0)
+
+
+def _must_wait(
+    robot: RobotSeen, x: float, y: float, bearing: float, speed: float, manners: Manners
+) -> bool:
+    """Whether the robot is near ahead, or would come too near if both went straight on."""
+    dx, dy = robot.nearest(x, y)
+    near = math.hypot(dx, dy)
+    turn = abs(math.remainder(math.atan2(dy, dx) - bearing, 2.0 * math.pi))
+    if near < manners.stop_distance and turn < AHEAD:
+        return True
+    vx, vy = speed * math.cos(bearing), speed * math.sin(bearing)
+    if math.hypot(robot.vx, robot.vy) < STANDING:
+        return False
+    for k in range(1, FORESEEN + 1):
+        after = k * FORESIGHT
+        distance = math.hypot(*robot.nearest(x + vx * after, y + vy * after, after))
+        # Who is too near already may go where it becomes more.
+        if distance < min(RADIUS + MARGIN, near):
+            return True
+    return False
