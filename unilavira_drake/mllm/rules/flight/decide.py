@@ -6,7 +6,7 @@ from typing import Any
 
 from unilavira_drake.mllm.rules.flight.legs import describe
 from unilavira_drake.mllm.rules.flight.moves import Move, next_move, side_of
-from unilavira_drake.mllm.rules.flight.parser import parse_directive
+from unilavira_drake.mllm.rules.flight.parser import plan_legs
 from unilavira_drake.mllm.rules.flight.progress import FlightProgress, review_flight
 from unilavira_drake.mllm.rules.flight.situation import FlightSituation
 
@@ -17,7 +17,7 @@ SCENE_LIMIT = 100
 
 def plan_flight(situation: FlightSituation) -> dict[str, Any]:
     """Returns the reply to ``plan_todo``."""
-    legs = parse_directive(situation.variables.task, situation.scene.height)
+    legs = plan_legs(situation.variables.task, situation.scene.height)
     return {
         "reasoning": f"{len(legs)} legs found in the text.",
         "todo": [describe(leg) for leg in legs] or [NOTHING_UNDERSTOOD],

@@ -9,8 +9,8 @@ from unilavira_drake.messages import DIRECTIONS, DOWN, VIEW_YAW
 from unilavira_drake.mllm.rules.flight.legs import Leg
 from unilavira_drake.mllm.rules.flight.progress import FlightProgress
 from unilavira_drake.mllm.rules.flight.scene import LandmarkSight
-from unilavira_drake.mllm.rules.flight.situation import LEVEL, FlightSituation
-from unilavira_drake.mllm.rules.flight.words import GROUND
+from unilavira_drake.mllm.rules.flight.situation import LEVEL, PASSING, FlightSituation
+from unilavira_drake.mllm.rules.flight.words import GROUND, WAYS
 
 LOOKOUT = 25.0
 """Height from which one searches, metres."""
@@ -21,7 +21,11 @@ _STRIDE = 30.0
 _MARGIN = 8.0
 """What is left free ahead, metres."""
 _BACK = 12.0
-"""What speaks against the view to which the last place lies, metres of free distance."""
+"""What each place where the aircraft was speaks against the view to it, metres of free distance."""
+_NEAR_PLACE = 80.0
+"""Farther places are not minded, metres."""
+_PROMISE = 8.0
+"""What each landmark in a view is worth to the search, metres of free distance."""
 _FAILED = 50.0
 _SIDES = {"left": 90.0, "right": -90.0, "around": 180.0}
 
@@ -72,6 +76,9 @@ def next_move(situation: FlightSituation, progress: FlightProgress) -> Move:
     back = _remembered(situation, hard)
     if back is not None:
         return back
+    around = _chosen(situation, Leg("go", hard.beside), side) if hard and hard.beside else None
+    if around is not None and around.distance > PASSING:
+        return _to_sight(situation, Leg("past", hard.beside if hard else ""), around)
     return _search(situation, side)
 
 
@@ -181,17 +188,14 @@ def _search(situation: FlightSituation, side: str) -> Move:
         return turn(DOWN, BELOW, scene.height, 0.0, why, LOOKOUT - scene.height)
     stated = situation.stated()
     goal = stated[1] if stated is not None else _SIDES[side] if side else None
-    last = situation.variables.waypoints
-    previous = max((w for w in last if w is not situation.here), key=lambda w: w.id, default=None)
 
     def worth(direction: str) -> float:
         axis = math.degrees(VIEW_YAW[direction])
         value = scene.free.get(direction, 0.0) - situation.tried(direction)
+        value += _PROMISE * min(len(_landmarks(situation, direction)), 5)
         if goal is not None:
-            value -= _apart(axis, goal)
-        elif previous is not None and _apart(axis, previous.bearing) < 50.0:
-            value -= _BACK
-        return value if _has_ground(situation, direction) else value - 20.0
+            return value - _apart(axis, goal)
+        return value - _visited(situation, axis)
 
     best = max(DIRECTIONS, key=lambda d: (round(worth(d), 3), -DIRECTIONS.index(d)))
     bearing = math.degrees(VIEW_YAW[best])
@@ -202,9 +206,17 @@ def _search(situation: FlightSituation, side: str) -> Move:
     return turn(best, OPEN_GROUND, reach, bearing, why, None)
 
 
-def _has_ground(situation: FlightSituation, direction: str) -> bool:
-    sights = situation.scene.sights
-    return any(s.direction == direction and s.category in GROUND for s in sights)
+def _landmarks(situation: FlightSituation, direction: str) -> set[str]:
+    """Returns the names of what stands or leads somewhere in a view."""
+    sights = (s for s in situation.scene.sights if s.direction == direction)
+    return {s.name for s in sights if s.category not in GROUND or s.category in WAYS}
+
+
+def _visited(situation: FlightSituation, axis: float) -> float:
+    """Returns what the places where the aircraft was speak against a direction, metres."""
+    here = situation.here
+    near = (w for w in situation.variables.waypoints if w is not here and w.distance < _NEAR_PLACE)
+    return min(sum(_BACK for w in near if _apart(axis, w.bearing) <= 45.0), 4 * _BACK)
 
 
 def _apart(a: float, b: float) -> float:

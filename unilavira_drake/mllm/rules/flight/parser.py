@@ -91,6 +91,18 @@ def parse_directive(text: str, height: float = 0.0) -> tuple[Leg, ...]:
     return tuple(_merged(legs)[:MAX_LEGS])
 
 
+def plan_legs(text: str, height: float) -> tuple[Leg, ...]:
+    """Returns the legs of a directive; at the last landmark it is stopped, others are only passed.
+
+    Arguments as for :func:`parse_directive`.
+    """
+    legs = list(parse_directive(text, height))
+    last = max((i for i, leg in enumerate(legs) if leg.landmark and leg.hard), default=None)
+    if last is not None and legs[last].kind == "go":
+        legs[last] = dataclasses.replace(legs[last], kind="stop")
+    return tuple(legs)
+
+
 def _part(part: str, height: float) -> list[Leg]:
     if not part or re.search(r"\bdegrees?\b", part):
         return []

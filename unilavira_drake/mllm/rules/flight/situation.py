@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from unilavira_drake.messages import ON_THE_WAY, TodoItem
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, WaypointNote
 from unilavira_drake.mllm.rules.flight.legs import Leg
-from unilavira_drake.mllm.rules.flight.parser import parse_directive
+from unilavira_drake.mllm.rules.flight.parser import parse_directive, plan_legs
 from unilavira_drake.mllm.rules.flight.scene import AirScene, LandmarkSight, look_around
 
 REACH = 15.0
@@ -56,7 +56,7 @@ class FlightSituation:
         for sight in self.scene.matching(leg):
             if leg.kind == "over":
                 there = sight.below
-            elif leg.kind == "past":
+            elif leg.kind in ("past", "go"):
                 there = sight.below or sight.distance <= PASSING
             else:
                 beside = sight.distance <= BESIDE_REACH or sight.below or sight.drop > 0.0
@@ -91,7 +91,7 @@ def assess_flight(request: MllmRequest) -> FlightSituation:
     assert isinstance(variables, LanguageVariables)
     scene = look_around(request.evidence or (), variables.views)
     if variables.todo is None:
-        legs = parse_directive(variables.task, scene.height)
+        legs = plan_legs(variables.task, scene.height)
         steps = _from_history(legs, variables)
     else:
         steps = _from_list(variables.todo)

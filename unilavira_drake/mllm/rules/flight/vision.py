@@ -25,6 +25,8 @@ from unilavira_drake.mllm.rules.vocabulary import color_name
 _ORDER = re.compile(r"Target: (.+?), about ([\d.]+) m, ([\d.]+) deg (left|right) of")
 _FILLED = 0.6
 """A thing that fills less of its box than this is pointed at."""
+_AHEAD = 0.08
+"""Open ground is marked this far below the horizon, share of the picture's height."""
 _FAR_END = 0.2
 """A way is marked this far down from the upper end of what is seen of it, share of its height."""
 
@@ -101,9 +103,19 @@ def _open_ground(view: ViewEvidence, bearing: float) -> dict[str, Any]:
         flat = landmark_class(d.category) in GROUND or d.category == "floor"
         return d.point_distance - 0.5 * off + (20.0 if flat else 0.0)
 
-    best = max(view.detections, key=lambda d: (round(worth(d), 3), d.id))
-    return _reply(f"{OPEN_GROUND} towards the {_name(best)}", f"detection {best.id}",
-                  point=[*best.point])  # fmt: skip
+    focal = view.width / (2.0 * math.tan(view.horizontal_fov / 2.0))
+    u = view.width / 2.0 - focal * math.tan(math.radians(min(max(bearing, -40.0), 40.0)))
+    ahead = [u, (0.5 + _AHEAD) * view.height]
+    best = max(view.detections, key=lambda d: (_holds(d, ahead), round(worth(d), 3), d.id))
+    point = ahead if _holds(best, ahead) else [*best.point]
+    return _reply(f"{OPEN_GROUND} towards the {_name(best)}", f"detection {best.id}", point=point)
+
+
+def _holds(d: Detection, pixel: list[float]) -> bool:
+    """Whether a pixel lies in the box of something flat."""
+    flat = landmark_class(d.category) in GROUND or d.category == "floor"
+    u_min, v_min, u_max, v_max = d.box
+    return flat and u_min <= pixel[0] <= u_max and v_min <= pixel[1] <= v_max
 
 
 def _free_text(variables: VisionVariables, view: ViewEvidence) -> dict[str, Any]:
