@@ -8,6 +8,7 @@ import dataclasses
 import math
 from types import SimpleNamespace
 
+import numba
 import numpy as np
 
 from unilavira_drake.errors import ReplyFormatError
@@ -101,19 +102,33 @@ class Town:
         return x, y, z, yaw if heading is None else heading
 
 
+BOUNDS_OF = np.array(
+    [[np.array(c) - np.array(s) / 2, np.array(c) + np.array(s) / 2] for *_, c, s in THINGS]
+)
+
+
 def cast(X_WC):
     """Returns depth along the axis and the thing at each pixel (-1: none), as if in clear air."""
-    u, v = np.meshgrid(np.arange(LENS.width), np.arange(LENS.height))
-    rays = np.stack(((u - LENS.cx) / LENS.fx, (v - LENS.cy) / LENS.fy, np.ones_like(u)), -1)
-    rays = rays @ X_WC[:3, :3].T
-    rays = np.where(np.abs(rays) < 1e-9, 1e-9, rays)
-    depth, index = np.full(u.shape, np.inf), np.full(u.shape, -1)
-    for i, (*_, center, size) in enumerate(THINGS):
-        low = (np.array(center) - np.array(size) / 2 - X_WC[:3, 3]) / rays
-        high = (np.array(center) + np.array(size) / 2 - X_WC[:3, 3]) / rays
-        near, far = np.minimum(low, high).max(-1), np.maximum(low, high).min(-1)
-        hit = (near <= far) & (near > 0.0) & (near < depth)
-        depth, index = np.where(hit, near, depth), np.where(hit, i, index)
+    pinhole_ = np.array([LENS.fx, LENS.fy, LENS.cx, LENS.cy])
+    return _cast(BOUNDS_OF, X_WC, pinhole_, LENS.width, LENS.height)
+
+
+@numba.njit(cache=True)
+def _cast(bounds, X_WC, pinhole_, width, height):
+    depth, index = np.full((height, width), np.inf), np.full((height, width), -1)
+    for v in range(height):
+        for u in range(width):
+            ray = np.array([(u - pinhole_[2]) / pinhole_[0], (v - pinhole_[3]) / pinhole_[1], 1.0])
+            ray = X_WC[:3, :3] @ ray
+            for i in range(len(bounds)):
+                near, far = 0.0, np.inf
+                for axis in range(3):
+                    q = ray[axis] if abs(ray[axis]) > 1e-9 else 1e-9
+                    a = (bounds[i, 0, axis] - X_WC[axis, 3]) / q
+                    b = (bounds[i, 1, axis] - X_WC[axis, 3]) / q
+                    near, far = max(near, min(a, b)), min(far, max(a, b))
+                if 0.0 < near <= far and near < depth[v, u]:
+                    depth[v, u], index[v, u] = near, i
     return depth, index
 
 
