@@ -22,6 +22,10 @@ LEAST_PIXELS = 5
 BIN = 0.01
 """Resolution of the answer, metres."""
 
+CONE = 0.03
+"""Half width of what counts as ahead from far away, as a share of the distance: a corridor in the
+distance is narrower than a pixel."""
+
 
 def free_distance(
     frame: Frame, *, min_height: float, max_height: float, max_range: float = 10.0
@@ -53,10 +57,23 @@ def free_distance(
     )
 
 
+def axial_distance(frame: Frame, *, max_range: float) -> float:
+    """Returns the metres from an aircraft's camera to the nearest obstacle along its axis.
+
+    An obstacle is whatever the depth image shows within ``CORRIDOR_WIDTH`` of the axis, and far
+    away within ``CONE`` of it, whether the axis is level or points straight down; ``max_range``
+    when nothing is in the way.
+    """
+    k = frame.intrinsics
+    pinhole = np.array([k.fx, k.fy, k.cx, k.cy])
+    return float(_nearest_on_axis(frozen_view(frame.depth, np.float32), pinhole, max_range))
+
+
 def warm_up() -> None:
     """Compiles the kernel, so that no control loop waits for the compiler."""
     level = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]], np.float64)
     free_distance(Frame(X_WC=level), min_height=0.1, max_height=1.4)
+    axial_distance(Frame(), max_range=1.0)
 
 
 @kernel
@@ -89,6 +106,29 @@ def _nearest(
             ahead = z * (rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2])
             if 0.0 < ahead < max_range:
                 bins[int(ahead / BIN)] += 1
+    count = 0
+    for i in range(len(bins)):
+        count += bins[i]
+        if count >= LEAST_PIXELS:
+            return i * BIN
+    return max_range
+
+
+@kernel
+def _nearest_on_axis(
+    depth: NDArray[np.float32], pinhole: NDArray[np.float64], max_range: float
+) -> float:
+    """Returns the depth at which the least number of pixels around the axis is reached."""
+    fx, fy, cx, cy = pinhole
+    bins = np.zeros(int(max_range / BIN) + 1, np.int32)
+    for v in range(depth.shape[0]):
+        y = abs((v - cy) / fy)
+        for u in range(depth.shape[1]):
+            z = depth[v, u]
+            if not 0.0 < z < max_range:
+                continue
+            if max(abs((u - cx) / fx), y) * z <= max(CORRIDOR_WIDTH / 2, CONE * z):
+                bins[int(z / BIN)] += 1
     count = 0
     for i in range(len(bins)):
         count += bins[i]

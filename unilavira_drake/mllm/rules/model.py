@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 from unilavira_drake.errors import MllmError
+from unilavira_drake.messages import DOWN
 from unilavira_drake.mllm.reply import Completion, Usage
-from unilavira_drake.mllm.request import MllmRequest, VisionVariables
+from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, VisionVariables
 from unilavira_drake.mllm.rules.check import answer, double_check
 from unilavira_drake.mllm.rules.decide import decide
 from unilavira_drake.mllm.rules.dials import RulesDials
+from unilavira_drake.mllm.rules.flight.decide import check_flight, decide_flight, plan_flight
+from unilavira_drake.mllm.rules.flight.situation import assess_flight
+from unilavira_drake.mllm.rules.flight.vision import ground_in_flight
 from unilavira_drake.mllm.rules.lexicon import unused_words
 from unilavira_drake.mllm.rules.mistakes import misdirected, refuse, written
 from unilavira_drake.mllm.rules.perception import perceived
@@ -64,6 +69,9 @@ class RulesModel:
 
 
 def _reply(request: MllmRequest) -> dict[str, Any]:
+    if _is_directive(request):
+        return _flight_reply(request)
+    request = _grounded(request)
     if isinstance(request.variables, VisionVariables):
         return ground(request.variables, request.evidence or ())
     situation = assess(request)
@@ -76,6 +84,35 @@ def _reply(request: MllmRequest) -> dict[str, Any]:
     if request.call == "answer":
         return answer(situation)
     raise MllmError(f"rules: unknown call {request.call!r}.")
+
+
+def _is_directive(request: MllmRequest) -> bool:
+    """Whether the task directs a flight; an aircraft indoors reads other tasks as a robot does."""
+    variables = request.variables
+    if not isinstance(variables, LanguageVariables | VisionVariables):
+        return False
+    return variables.in_flight and variables.family == "aerial_vln"
+
+
+def _grounded(request: MllmRequest) -> MllmRequest:
+    """Returns the request without the view straight down, of which rules for homes know nothing."""
+    evidence = tuple(view for view in request.evidence or () if view.direction != DOWN)
+    if len(evidence) == len(request.evidence or ()):
+        return request
+    return dataclasses.replace(request, evidence=evidence)
+
+
+def _flight_reply(request: MllmRequest) -> dict[str, Any]:
+    if isinstance(request.variables, VisionVariables):
+        return ground_in_flight(request.variables, request.evidence or ())
+    situation = assess_flight(request)
+    if request.call == "plan_todo":
+        return plan_flight(situation)
+    if request.call in ("decide", "recover"):
+        return decide_flight(situation)
+    if request.call == "double_check":
+        return check_flight(situation)
+    raise MllmError(f"rules: no reply to the call {request.call!r} in flight.")
 
 
 def _plan(situation: Situation) -> dict[str, Any]:

@@ -1,0 +1,180 @@
+"""``rules`` in flight: directives are read, flown in a town of boxes, and checked at the end."""
+
+import dataclasses
+import json
+
+import pytest
+from flight_town import CENTERS, Town, run
+
+from unilavira_drake.messages import DOWN, TodoItem
+from unilavira_drake.mllm.request import LanguageVariables
+from unilavira_drake.mllm.rules import RulesDials, RulesModel
+from unilavira_drake.mllm.rules.flight.legs import Leg, describe
+from unilavira_drake.mllm.rules.flight.parser import parse_directive, plan_legs
+
+REACH = 20.0
+"""What the judge of the family calls success, metres."""
+
+
+@pytest.fixture(scope="module")
+def town():
+    return Town()
+
+
+LEGS = {
+    "Climb to 20 m, fly over the roof of the school, then follow the road until the fountain and "
+    "stop next to the red car.": [
+        "Climb to 20 m", "Fly over the school", "Fly along the road", "Fly to the fountain",
+        "Stop at the red car",
+    ],
+    "The target is 120 m at 30 degrees from you. It is a red car near the church. Please control "
+    "the drone and find the target.": [
+        "Fly 120 m at 30 degrees to the right of the start", "Stop at the red car near the church",
+    ],
+    "Take off and climb by 15 m. Fly along the main street until you reach the church, turn left "
+    "at the church and fly over the park. Descend and hover above the pond.": [
+        "Climb to 25 m", "Fly along the road", "Fly past the church", "Turn left",
+        "Fly over the park", "Descend to 8 m", "Stop at the pond",
+    ],
+    "Fly past the white tower on your right, cross the river, and land beside the blue bus at the "
+    "car park.": [
+        "Fly past the white tower on the right", "Fly over the river",
+        "Stop at the blue bus near the car park",
+    ],
+    "Fly straight ahead over the houses to the park, then descend to 5 metres over the fountain.": [
+        "Fly over the house", "Fly to the park", "Fly over the fountain", "Descend to 5 m",
+    ],
+    "Turn right and follow the street to the yellow bus. The bus is 200 m away, 60 degrees to your "
+    "left.": [
+        "Fly 200 m at 60 degrees to the left of the start", "Turn right", "Fly along the road",
+        "Stop at the yellow bus",
+    ],
+    "Head to the left of the church, pass the school, and stop at the parking lot.": [
+        "Fly to the church", "Fly past the school", "Stop at the car park",
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", LEGS, ids=lambda text: text[:30])
+def test_directives_are_read_leg_by_leg(text):
+    assert [describe(leg) for leg in plan_legs(text, 10.0)] == LEGS[text]
+
+
+@pytest.mark.parametrize(
+    "leg",
+    [
+        Leg("climb", height=20.0),
+        Leg("descend", height=6.0),
+        *(Leg("turn", side=side) for side in ("left", "right", "around")),
+        Leg("heading", distance=120.0, bearing=-30.0),
+        Leg("heading", distance=80.0, bearing=45.0),
+        Leg("along", "road"),
+        *(
+            Leg(kind, landmark, color, beside, side)
+            for kind in ("over", "past", "go", "stop")
+            for landmark in ("church", "street lamp", "car park", "sports field")
+            for color in ("", "red")
+            for beside in ("", "fountain")
+            for side in ("", "left")
+        ),
+    ],
+    ids=describe,
+)
+def test_a_leg_is_read_back_from_its_own_words(leg):
+    assert parse_directive(describe(leg)) == (leg,)
+
+
+@pytest.mark.parametrize("text", ["", "Hello!", "Do a somersault.", "fly fly fly", "120 m", "."])
+def test_what_is_no_directive_has_no_legs(text):
+    assert parse_directive(text) == ()
+
+
+FLIGHTS = {
+    "Climb to 20 m, fly over the roof of the school, then follow the road until the bus and stop "
+    "next to the red car.": "car",
+    "The target is 122 m at 30 degrees from you. It is a white church. Please control the drone "
+    "and find the target.": "church",
+    "Fly past the school on your left, turn left and fly to the fountain in the park. Descend and "
+    "hover above the fountain.": "fountain",
+    "Climb to 30 m, follow the road until the yellow bus, then stop next to the blue car at the "
+    "park.": "blue_car",
+}
+
+
+@pytest.mark.parametrize("text", FLIGHTS, ids=lambda text: text[:30])
+def test_directives_are_flown(town, text):
+    flight = run(town, RulesModel(), text)
+    assert flight.stopped
+    assert flight.away(FLIGHTS[text]) <= REACH
+    assert all(item.status == "completed" for item in flight.todo.items)
+    assert min(pose[2] for *_, pose in flight.steps) > 3.0
+
+
+def test_a_thing_out_of_sight_is_searched_from_higher_up(town):
+    flight = run(town, RulesModel(), "Fly to the red car and stop.", start=(-60.0, 40.0, 10.0, 2.0))
+    assert flight.stopped
+    assert flight.away("car") <= REACH
+    assert max(pose[2] for *_, pose in flight.steps) >= 22.0
+
+
+def test_without_a_list_it_flies_on_what_the_history_tells(town):
+    flight = run(
+        town, RulesModel(), "Fly past the school and stop at the white church.", todo=False
+    )
+    assert flight.stopped
+    assert flight.away("church") <= REACH
+
+
+def test_where_nothing_can_be_marked_it_flies_by_the_stated_direction(town):
+    start = (0.0, 0.0, 95.0, 0.0)  # too high for the depth camera and too far for any landmark
+    text = "The target is 60 m at 6 degrees to your left. It is a red car."
+    flight = run(town, _Blind(), text, start=start, budget=4)
+    fly = next(action for _, action, _, _ in flight.steps if action.tool == "fly")
+    assert fly.bearing == pytest.approx(6.0)
+    assert 5.0 <= fly.distance <= 40.0
+    asked = next(request for request, action, *_ in flight.steps if action.tool == "fly")
+    assert asked.variables.bearings.goal_distance == pytest.approx(60.0)
+
+
+class _Blind(RulesModel):
+    """Sees nothing at all."""
+
+    def complete(self, request):
+        views = tuple(dataclasses.replace(v, detections=()) for v in request.evidence)
+        return super().complete(dataclasses.replace(request, evidence=views))
+
+
+def test_a_stop_far_from_the_last_landmark_is_rejected(town):
+    flight = run(town, RulesModel(), "Stop at the red car.", budget=2)
+    request = flight.steps[-1][0]
+    done = (TodoItem("Stop at the red car", "completed", "seen"),)
+    variables = dataclasses.replace(request.variables, todo=done)
+    asked = dataclasses.replace(request, call="double_check", variables=variables)
+    reply = json.loads(RulesModel().complete(asked).text)
+    assert reply["confirmed"] is False
+    assert "red car" in reply["reason"]
+
+
+def test_tasks_for_homes_are_read_as_on_the_ground(town):
+    """An aircraft with another task uses the rules for homes, which know no view straight down."""
+    request = run(town, RulesModel(), "Fly to the red car.", budget=1).steps[0][0]
+    flown = dataclasses.replace(request.variables, family="vln", task="Go to the red sofa.")
+    reply = json.loads(
+        RulesModel().complete(dataclasses.replace(request, variables=flown, call="decide")).text
+    )
+    assert reply["action"]["tool"] in ("turn", "double_check")
+    assert reply["action"].get("direction") != DOWN
+
+
+def test_dials_err_in_flight_too(town):
+    model = RulesModel(RulesDials(label_dropout=0.2, wrong_direction=0.3, box_jitter=0.1))
+    flight = run(town, model, "Fly to the red car and stop.", budget=12)
+    assert len(flight.steps) >= 3
+    assert isinstance(flight.steps[0][0].variables, LanguageVariables)
+
+
+def test_the_same_request_gets_the_same_reply(town):
+    text = "Fly past the school and stop at the white church."
+    first, second = (run(town, RulesModel(), text) for _ in range(2))
+    assert [a for _, a, _, _ in first.steps] == [a for _, a, _, _ in second.steps]
+    assert set(CENTERS) >= {"church"}

@@ -1,0 +1,1 @@
+"""How ``rules`` reads and carries out flight directives."""

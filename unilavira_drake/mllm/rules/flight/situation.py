@@ -1,0 +1,124 @@
+"""Everything one decision in flight is made from: legs, scene, and what was tried."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from unilavira_drake.messages import ON_THE_WAY, TodoItem
+from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, WaypointNote
+from unilavira_drake.mllm.rules.flight.legs import Leg
+from unilavira_drake.mllm.rules.flight.parser import parse_directive, plan_legs
+from unilavira_drake.mllm.rules.flight.scene import AirScene, LandmarkSight, look_around
+
+REACH = 15.0
+"""A landmark this near, through the air, is reached, metres."""
+BESIDE_REACH = 9.0
+"""One that stands as high as the aircraft: along the ground, metres."""
+PASSING = 25.0
+"""One that is only passed: along the ground, metres."""
+LEVEL = 2.5
+"""A height is reached within this, metres."""
+
+
+@dataclass(frozen=True)
+class FlightStep:
+    """One item of the plan; ``index`` counts from 1 in the list as shown."""
+
+    index: int
+    leg: Leg
+    done: bool = False
+
+
+@dataclass(frozen=True)
+class FlightSituation:
+    """What the reasoner knows at one call."""
+
+    variables: LanguageVariables
+    scene: AirScene
+    steps: tuple[FlightStep, ...]
+
+    @property
+    def here(self) -> WaypointNote | None:
+        """The present waypoint."""
+        current = self.variables.current_waypoint
+        return next((w for w in self.variables.waypoints if w.id == current), None)
+
+    @property
+    def pending(self) -> tuple[FlightStep, ...]:
+        """The steps still to be done, in order."""
+        return tuple(step for step in self.steps if not step.done)
+
+    def reached(self, leg: Leg) -> LandmarkSight | None:
+        """Returns the landmark of a leg if the aircraft is where the leg wants it."""
+        for sight in self.scene.matching(leg):
+            if leg.kind == "over":
+                there = sight.below
+            elif leg.kind in ("past", "go"):
+                there = sight.below or sight.distance <= PASSING
+            else:
+                beside = sight.distance <= BESIDE_REACH or sight.below or sight.drop > 0.0
+                there = sight.away <= REACH and beside
+            if there:
+                return sight
+        return None
+
+    def tried(self, direction: str) -> float:
+        """Returns what earlier tries in a direction from here speak against it, metres."""
+        texts = self.here.tried if self.here else ()
+        own = [text for text in texts if text.startswith(f"{direction}: ")]
+        failures = sum(text.startswith(f"{direction}: failed") for text in own)
+        return 60.0 * failures + 15.0 * (len(own) - failures)
+
+    def stated(self) -> tuple[float, float] | None:
+        """Returns (metres, degrees to the left) to the place that the plan states, from here."""
+        step = next((s for s in self.steps if s.leg.kind == "heading"), None)
+        start = min(self.variables.waypoints, key=lambda w: w.id, default=None)
+        if step is None or start is None:
+            return None
+        to_start, heading = math.radians(start.bearing), math.radians(start.heading)
+        angle = heading + math.radians(step.leg.bearing)
+        x = start.distance * math.cos(to_start) + step.leg.distance * math.cos(angle)
+        y = start.distance * math.sin(to_start) + step.leg.distance * math.sin(angle)
+        return math.hypot(x, y), math.degrees(math.atan2(y, x))
+
+
+def assess_flight(request: MllmRequest) -> FlightSituation:
+    """Returns the situation that a language request in flight describes."""
+    variables = request.variables
+    assert isinstance(variables, LanguageVariables)
+    scene = look_around(request.evidence or (), variables.views)
+    if variables.todo is None:
+        legs = plan_legs(variables.task, scene.height)
+        steps = _from_history(legs, variables)
+    else:
+        steps = _from_list(variables.todo)
+    return FlightSituation(variables, scene, tuple(steps))
+
+
+def _from_list(todo: Sequence[TodoItem]) -> list[FlightStep]:
+    """Returns the TODO list as steps; an item that is no leg counts as done."""
+    steps = []
+    for index, item in enumerate(todo, start=1):
+        legs = parse_directive(item.content)
+        if legs:
+            steps.append(FlightStep(index, legs[0], item.status == "completed"))
+    return steps
+
+
+def _from_history(legs: Sequence[Leg], variables: LanguageVariables) -> list[FlightStep]:
+    """Returns the plan with what the window of decisions shows as done: all there is without TDM.
+
+    A landmark was reached where a flight to it arrived; heights and ways before it are done then.
+    """
+    texts = [note.text for note in variables.decisions]
+    done = [bool(leg.landmark) and any(_arrived_at(leg, text) for text in texts) for leg in legs]
+    last = max((i for i, reached in enumerate(done) if reached), default=-1)
+    return [FlightStep(i + 1, leg, i < last or done[i]) for i, leg in enumerate(legs)]
+
+
+def _arrived_at(leg: Leg, decision: str) -> bool:
+    target = rf" to '[^']*{re.escape(leg.landmark)}[^']*': arrived(?!: {ON_THE_WAY})"
+    return re.search(target, decision) is not None
