@@ -253,12 +253,7 @@ def _pavilion(generator: np.random.Generator) -> list[Part]:
         ("stone", standing((0, 0, 0), (5.6, 5.6, 0.25))),
         ("canvas", np.concatenate(posts)),
         ("paint", pyramid((0, 0, 2.8), (6.0, 6.0, 2.0))),
-        ("paint", pyramid((0, 0, 2.8), (6.0, 6.0, 0.01))[:, _UNDER]),
     ]
-
-
-_UNDER = [1, 0, 2, 3]
-"""The order of corners that turns a triangle to the other side."""
 
 
 def _boat(generator: np.random.Generator) -> list[Part]:
