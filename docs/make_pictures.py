@@ -2,6 +2,7 @@
 
 python docs/make_pictures.py views     # docs/views.jpg
 python docs/make_pictures.py run       # docs/run.gif
+python docs/make_pictures.py town      # docs/town.jpg
 """
 
 from __future__ import annotations
@@ -16,14 +17,21 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
+from pydrake.geometry import ClippingRange, DepthRange, RenderCameraCore
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.sensors import CameraInfo
 
 from unilavira_drake import load_scenario, make_navigation_diagram
 from unilavira_drake.messages import LanguageAction, TodoList, VisionAction
+from unilavira_drake.raster import RasterCameraConfig, RasterView, add_raster_camera, suns_of
 from unilavira_drake.recording.message_log import MessageLog
 from unilavira_drake.station import make_navigation_station
 from unilavira_drake.worlds.clearance import clearance, room_grid
 from unilavira_drake.worlds.load import load_world
+from unilavira_drake.worlds.scenery import add_scenery, lights
 from unilavira_drake.worlds.world import Room, World
 
 FOLDER = Path(__file__).parent
@@ -81,6 +89,57 @@ def views() -> Image.Image:
         place = (index % COLUMNS * TILE[0], index // COLUMNS * TILE[1])
         sheet.paste(Image.fromarray(tile).resize(TILE, Image.Resampling.LANCZOS), place)
     return sheet
+
+
+TOWN_VIEWS = (
+    # x, y, z (metres), yaw and pitch (degrees, down is positive), width and height (pixels).
+    ((218.0, -20.0, 150.0, 90.0, 38.0), (1280, 620)),
+    ((150.0, 30.0, 40.0, 90.0, 26.0), (640, 400)),
+    ((240.0, 118.0, 9.0, 8.0, 8.0), (640, 400)),
+    ((46.0, 60.0, 25.0, 90.0, 24.0), (640, 400)),
+    ((300.0, 201.0, 5.0, 180.0, 3.0), (640, 400)),
+)
+
+
+def town() -> Image.Image:
+    """Returns the town from high above and, below, from where aircraft fly."""
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.01)
+    add_scenery(plant, scene_graph, load_world("town"))
+    plant.Finalize()
+    cameras: list[Any] = []
+    for index, (place, (width, height)) in enumerate(TOWN_VIEWS):
+        focal = 0.56 * width
+        core = RenderCameraCore(
+            "raster",
+            CameraInfo(2 * width, 2 * height, 2 * focal, 2 * focal, width, height),
+            ClippingRange(0.1, 900.0),
+            RigidTransform(),
+        )
+        view = RasterView(
+            scene_graph.world_frame_id(), looking(*place), core, DepthRange(0.1, 800.0)
+        )
+        config = RasterCameraConfig((view,), light=suns_of(lights()))
+        cameras.append(add_raster_camera(builder, scene_graph, config, f"camera_{index}"))
+    context = builder.Build().CreateDefaultContext()
+    sheet = Image.new("RGB", (1280, 620 + 2 * 400), "white")
+    for index, (camera, (_, size)) in enumerate(zip(cameras, TOWN_VIEWS, strict=True)):
+        frame = camera.frames(camera.GetMyContextFromRoot(context))[0]
+        tile = Image.fromarray(np.array(frame.color[:, :, :3]))
+        row, column = divmod(index - 1, 2)
+        place = (640 * column, 620 + 400 * row) if index else (0, 0)
+        sheet.paste(tile.resize(size, Image.Resampling.LANCZOS), place)
+    return sheet
+
+
+def looking(x: float, y: float, z: float, yaw: float, pitch: float) -> RigidTransform:
+    """Returns a camera's pose in the world (x right, y down, z forward); degrees."""
+    c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
+    level, down = math.cos(math.radians(pitch)), math.sin(math.radians(pitch))
+    ahead, right = np.array([c * level, s * level, -down]), np.array([s, -c, 0.0])
+    axes: Any = np.stack((right, np.cross(ahead, right), ahead), axis=1)
+    p_WC: Any = np.array([x, y, z])
+    return RigidTransform(RotationMatrix(axes), p_WC)
 
 
 class Story:
@@ -151,12 +210,15 @@ def animation(scenario_name: str, task: str) -> list[Image.Image]:
 def main() -> None:
     """Draws what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("views", "run"))
+    parser.add_argument("what", choices=("views", "run", "town"))
     parser.add_argument("--scenario", default="apartment")
     parser.add_argument("--task", default="fridge")
     options = parser.parse_args()
     if options.what == "views":
         views().save(FOLDER / "views.jpg", quality=82)
+        return
+    if options.what == "town":
+        town().save(FOLDER / "town.jpg", quality=74, optimize=True)
         return
     pictures = animation(options.scenario, options.task)
     small = [picture.quantize(128, dither=Image.Dither.NONE) for picture in pictures]

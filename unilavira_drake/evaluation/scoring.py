@@ -86,13 +86,17 @@ class Score(Message):
 
 
 def make_goal_field(
-    goal: str, world: World, *, radius: float, resolution: float = 0.05
+    goal: str, world: World, *, radius: float, resolution: float | None = None
 ) -> GoalField:
     """Returns what scores a goal text in a world for a robot of this radius.
+
+    Cells have a side of 5 cm, or 25 cm under the open sky, unless ``resolution`` says otherwise.
 
     Raises:
         TaskError: if the text does not resolve, or no free floor is near a target.
     """
+    if resolution is None:
+        resolution = 0.25 if world.outdoors else 0.05
     targets = resolve_goal(goal, world)
     space = free_space(world, radius=radius, resolution=resolution)
     fields = tuple(

@@ -18,7 +18,9 @@ _OVERHEAD = 1.0
 _HANGING = 1.8
 """What begins above this height is over the robot and gets no word, metres."""
 _RASTER = 0.01
-"""Metres."""
+"""Metres; coarser where a thing is larger than a house."""
+_MOST_CELLS = 3000
+"""Along a side of the raster of a thing."""
 
 Outline = NDArray[np.float64]
 """(k, 2) corners, metres in the world."""
@@ -85,17 +87,16 @@ def _plan_thing(thing: WorldObject) -> PlanThing:
 def _union(
     footprints: list[Outline], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[Outline, ...]:
-    """The outlines of convex footprints together, through a raster of ``_RASTER``."""
+    """The outlines of convex footprints together, through a raster."""
     if len(footprints) == 1:
         return (footprints[0],)
-    columns, rows = np.ceil((high - low) / _RASTER).astype(int) + 1
+    step = max(_RASTER, float((high - low).max()) / _MOST_CELLS)
+    columns, rows = np.ceil((high - low) / step).astype(int) + 1
     mask = np.zeros((rows, columns), np.uint8)
     for footprint in footprints:
-        cv2.fillConvexPoly(mask, np.rint((footprint - low) / _RASTER).astype(np.int32), 1)
+        cv2.fillConvexPoly(mask, np.rint((footprint - low) / step).astype(np.int32), 1)
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    return tuple(
-        cv2.approxPolyDP(contour, 1.0, True)[:, 0, :] * _RASTER + low for contour in contours
-    )
+    return tuple(cv2.approxPolyDP(contour, 1.0, True)[:, 0, :] * step + low for contour in contours)
 
 
 def _bounds(rooms: Iterable[Room]) -> tuple[float, float, float, float]:

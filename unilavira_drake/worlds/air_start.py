@@ -1,4 +1,4 @@
-"""Where an aircraft starts: in the air, or standing on the ground."""
+"""Where an aircraft starts in the air."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 
 from unilavira_drake.errors import TaskError
 from unilavira_drake.worlds.air_clearance import nearest_solid
-from unilavira_drake.worlds.start import parse_start
 from unilavira_drake.worlds.world import World
 
 _HIGHEST = 200.0
@@ -18,28 +17,20 @@ AirStart = tuple[float, float, float, float]
 """x, y, z (metres) and yaw (radians)."""
 
 
-def parse_air_start(
-    text: str, world: World, *, radius: float, standing_height: float = 0.0
-) -> AirStart:
-    """Returns x, y, z (metres) and yaw (radians) of an aircraft's start.
+def parse_air_start(text: str, world: World, *, radius: float) -> AirStart:
+    """Returns x, y, z (metres) and yaw (radians) of ``X,Y,Z,YAW``.
 
-    ``X,Y,Z,YAW`` is in the air; ``X,Y,YAW`` and ``ROOM`` are as for a robot on the ground.  All are
-    written for the world as its file says; in a mirrored world y and yaw are negated with it.
+    It is written for the world as its file says; in a mirrored world y and yaw are negated with it.
 
     Args:
-        text: X,Y,Z,YAW, X,Y,YAW or ROOM.
+        text: X,Y,Z,YAW.
         world: where the start must be free.
-        radius: the aircraft's, metres; a start in the air keeps at least this clearance, to the
-            ground too.
-        standing_height: of its centre when it stands on the ground, metres.
+        radius: the aircraft's, metres; it keeps at least this clearance, to the ground too.
 
     Raises:
         TaskError: names the value and the remedy, for malformed text and for a place that is
             outside the world or not free.
     """
-    if text.count(",") != 3:
-        x, y, yaw = parse_start(text, world, radius=radius)
-        return x, y, standing_height, yaw
     try:
         x, y, z, yaw = (float(part) for part in text.split(","))
     except ValueError:

@@ -48,6 +48,8 @@ def build_world(entries: WorldFile, place: str) -> World:
     Raises:
         ScenarioError: names the place in the file, the value and the remedy.
     """
+    if not entries.outdoors:
+        _check_indoors(entries, place)
     floors = GROUND if entries.outdoors else FLOORS
     rooms = tuple(
         _room(entry, floors, f"{place}: rooms: {entry.name!r}") for entry in entries.rooms
@@ -63,7 +65,6 @@ def build_world(entries: WorldFile, place: str) -> World:
     _unique((*entries.rooms, *entries.doors, *entries.objects, *entries.panels), place)
     if entries.outdoors:
         return _outdoors(entries, rooms, place)
-    _check_indoors(entries, place)
     by_name = {room.name: room for room in rooms}
     _check_materials(rooms, place)
     things = _things(entries.objects, by_name, entries.wall_thickness, place)

@@ -1,4 +1,4 @@
-"""Where the robot starts: ROOM or X,Y,YAW, checked against the world."""
+"""Where the robot starts: ROOM, X,Y,YAW or X,Y,Z,YAW, checked against the world."""
 
 from __future__ import annotations
 
@@ -7,22 +7,33 @@ import math
 import numpy as np
 
 from unilavira_drake.errors import TaskError, unknown_name
+from unilavira_drake.worlds.air_start import parse_air_start
 from unilavira_drake.worlds.clearance import clearance, nearest_obstacle, room_grid
 from unilavira_drake.worlds.world import Room, World
 
 GRID_STEP = 0.05
 """Spacing of the points among which a free one is looked for, metres."""
+POINTS_OUTDOORS = 120
+"""Of them along the longer side of a district."""
 
 
 def parse_start(text: str, world: World, *, radius: float) -> tuple[float, float, float]:
-    """Returns x, y (metres) and yaw (radians) of a start.
+    """Returns x, y (metres) and yaw (radians) of a start; see :func:`parse_start_pose`."""
+    x, y, _, yaw = parse_start_pose(text, world, radius=radius)
+    return x, y, yaw
+
+
+def parse_start_pose(
+    text: str, world: World, *, radius: float
+) -> tuple[float, float, float, float]:
+    """Returns x, y, z (metres) and yaw (radians) of a start.
 
     ``ROOM`` (a name or kind) is the point of that room farthest from everything, yaw 0.
     ``X,Y,YAW`` is written for the world as its file says; in a mirrored world y and yaw are
-    negated with it.
+    negated with it.  ``X,Y,Z,YAW`` is a start in the air, in a world under the open sky.
 
     Args:
-        text: ROOM or X,Y,YAW.
+        text: ROOM, X,Y,YAW or X,Y,Z,YAW.
         world: where the start must be free.
         radius: the robot's, metres; a start keeps at least this clearance.
 
@@ -34,12 +45,14 @@ def parse_start(text: str, world: World, *, radius: float) -> tuple[float, float
     if not text:
         raise TaskError(f"start: empty; give a room ({_rooms(world)}) or X,Y,YAW.")
     if "," not in text:
-        return (*_free_point(text, world, radius), 0.0)
+        return (*_free_point(text, world, radius), 0.0, 0.0)
+    if world.outdoors and text.count(",") == 3:
+        return parse_air_start(text, world, radius=radius)
     x, y, yaw = _numbers(text, world)
     if world.mirrored:
         y, yaw = -y, -yaw
     _check_free(text, x, y, world, radius)
-    return x, y, yaw
+    return x, y, 0.0, yaw
 
 
 def _rooms(world: World) -> str:
@@ -74,10 +87,16 @@ def _free_point(name: str, world: World, radius: float) -> tuple[float, float]:
 
 
 def _roomiest(room: Room, world: World) -> tuple[float, float, float]:
-    points = room_grid(room, GRID_STEP)
+    points = room_grid(room, _step(room, world))
     distances = clearance(world, points)
     best = int(np.argmax(distances))
     return float(points[best, 0]), float(points[best, 1]), float(distances[best])
+
+
+def _step(room: Room, world: World) -> float:
+    """Spacing of the points in a room; in a district they lie farther apart."""
+    x_min, y_min, x_max, y_max = room.rectangle
+    return max(x_max - x_min, y_max - y_min) / POINTS_OUTDOORS if world.outdoors else GRID_STEP
 
 
 def _check_free(text: str, x: float, y: float, world: World, radius: float) -> None:
@@ -91,7 +110,7 @@ def _check_free(text: str, x: float, y: float, world: World, radius: float) -> N
     if distance >= radius:
         return
     where = f"inside {name}" if distance == 0.0 else f"only {distance:.2f} m from {name}"
-    points = room_grid(room, GRID_STEP)
+    points = room_grid(room, _step(room, world))
     free = points[clearance(world, points) >= radius]
     remedy = f"give a room: {_rooms(world)}"
     if len(free):

@@ -173,7 +173,6 @@ def _roof(skin: _Skin, building: Building, generator: np.random.Generator) -> No
         drop = rise * _EAVES / (min(depth, width) / 2)
         slopes = pyramid((0.0, 0.0, height - drop), (*over, rise + drop))
         skin.add(slopes, "roof")
-        skin.add(_underside(over, height - drop), "trim")
         return
     across = building.roof == "nave"
     half = (width if across else depth) / 2
@@ -185,8 +184,6 @@ def _roof(skin: _Skin, building: Building, generator: np.random.Generator) -> No
         slopes, ends = _turned(slopes), _turned(ends)
     for slope in slopes:
         skin.spread(slope, "roof")
-        # Seen from below, where it stands over the wall.
-        skin.add(slope[None, ::-1] - np.array([0.0, 0.0, 0.06]), "trim")
     skin.add(ends, "wall")
     for _ in range(building.chimneys):
         # Beside the ridge, wherever that is.
@@ -225,7 +222,6 @@ def _tower(
         skin, building, (side, side, height), (x, 0.0), generator, bare=building.windows != "plain"
     )
     skin.add(pyramid((x, 0.0, height), (side + 0.6, side + 0.6, 1.6 * side)), "roof")
-    skin.add(_underside((side + 0.6, side + 0.6), height, x), "trim")
     reach, middle = side / 2 + 0.03, height - 0.45 * side
     face = np.array([(reach, -1, -1), (reach, 1, -1), (reach, 1, 1), (reach, -1, 1)], float)
     face *= np.array([1.0, 0.32 * side, 0.32 * side])
@@ -252,11 +248,6 @@ def _sign(building: Building) -> TexturedQuads:
     # The board is the same in a mirrored world, so that its words can be read.
     quads = moved(board[None], building.place, mirrored=False)
     return TexturedQuads(quads, np.array([[(0, 1), (1, 1), (1, 0), (0, 0)]], float), pixels)
-
-
-def _underside(size: tuple[float, float], z: float, x: float = 0.0) -> Quads:
-    a, b = size[0] / 2, size[1] / 2
-    return np.array([[(x - a, -b, z), (x - a, b, z), (x + a, b, z), (x + a, -b, z)]])
 
 
 def _turned(quads: Quads) -> Quads:

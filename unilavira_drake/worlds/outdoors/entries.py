@@ -14,8 +14,7 @@ class GroundEntry:
     material: str = ""
     # x_min, y_min, x_max, y_max, metres.
     rectangle: list[float] = dc.field(default_factory=list)
-    # What is painted on it: lane, crossing_x, crossing_y, parking, pitch or nothing. The stripes of
-    # a crossing_x are walked along x.
+    # What is painted on it: lane, crossing_x (walked along x), crossing_y, parking or pitch.
     marking: str = ""
     # Whether it is the ellipse in the rectangle. Nothing may lie over it.
     round: bool = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import cv2
@@ -39,6 +40,7 @@ _GLASS = np.array((0.30, 0.38, 0.46), np.float32)
 _FRAME = np.array((0.96, 0.96, 0.94), np.float32)
 
 
+@functools.lru_cache(maxsize=256)
 def facade_picture(facade: str, roof_color: str, seed: int) -> NDArray[np.uint8]:
     """Returns the (256, 256, 3) uint8 picture of a building."""
     generator = np.random.default_rng(seed)
@@ -66,6 +68,7 @@ def facade_picture(facade: str, roof_color: str, seed: int) -> NDArray[np.uint8]
         for twin in (column, column + 1) if row >= 2 else (column,):
             image[row * CELL : (row + 1) * CELL, twin * CELL : (twin + 1) * CELL] = drawn[name]
     pixels: NDArray[np.uint8] = np.clip(255.0 * image + 0.5, 0, 255).astype(np.uint8)
+    pixels.flags.writeable = False
     return pixels
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import zlib
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -95,6 +96,7 @@ class GroundPicture:
             )
 
 
+@functools.lru_cache(maxsize=len(GROUND))
 def _pattern(name: str) -> Image:
     """Returns the (512, 512, 3) picture of a material."""
     material = GROUND[name]
@@ -109,6 +111,7 @@ def _pattern(name: str) -> Image:
         shade *= _joints(material)
     image = 255.0 * shade[:, :, None] * np.array(material.color)
     pixels: Image = np.clip(image + 0.5, 0, 255).astype(np.uint8)
+    pixels.flags.writeable = False
     return pixels
 
 
@@ -137,18 +140,16 @@ def _lane(image: Image) -> None:
         road[middle - line // 2 : middle - line // 2 + line, start : start + dash] = _WHITE
 
 
-def _crossing_x(image: Image) -> None:
-    """Stripes of a zebra crossing that is walked along x."""
+def _crossing_y(image: Image) -> None:
+    """Stripes of a zebra crossing over a road along x."""
     stripe = round(0.55 * DETAIL)
     for start in range(stripe, image.shape[0] - stripe, 2 * stripe):
         image[start : start + stripe] = _WHITE
 
 
-def _crossing_y(image: Image) -> None:
-    """The same, walked along y."""
-    stripe = round(0.55 * DETAIL)
-    for start in range(stripe, image.shape[1] - stripe, 2 * stripe):
-        image[:, start : start + stripe] = _WHITE
+def _crossing_x(image: Image) -> None:
+    """The same over a road along y."""
+    _crossing_y(image.transpose(1, 0, 2))
 
 
 def _parking(image: Image) -> None:

@@ -184,7 +184,7 @@ def _truck(generator: np.random.Generator) -> list[Part]:
     return [
         ("paint", box((-1.0, 0, 2.1), (6.0, 2.45, 2.6))),
         ("dark", box((0.4, 0, 0.72), (8.4, 2.2, 0.3))),
-        ("canvas", box((3.3, 0, 1.75), (1.9, 2.4, 2.1))),
+        ("paint", box((3.3, 0, 1.75), (1.9, 2.4, 2.1))),
         ("window", box((3.6, 0, 2.2), (1.36, 2.43, 0.7))),
         *_wheels(2.9, 1.05, 0.5),
         *_wheels(1.6, 1.05, 0.5),
@@ -253,17 +253,14 @@ def _pavilion(generator: np.random.Generator) -> list[Part]:
         ("stone", standing((0, 0, 0), (5.6, 5.6, 0.25))),
         ("canvas", np.concatenate(posts)),
         ("paint", pyramid((0, 0, 2.8), (6.0, 6.0, 2.0))),
-        ("paint", pyramid((0, 0, 2.8), (6.0, 6.0, 0.01))[:, _UNDER]),
     ]
-
-
-_UNDER = [1, 0, 2, 3]
-"""The order of corners that turns a triangle to the other side."""
 
 
 def _boat(generator: np.random.Generator) -> list[Part]:
     hull = prism((0, 0, 0), (0.6, 1.0), 0.6, 8) * np.array([2.1, 0.8, 1.0])
-    return [("paint", hull[:8]), ("wood", hull[8:] - np.array([0, 0, 0.08]))]
+    benches = [box((x, 0, 0.58), (0.3, 1.3, 0.08)) for x in (-0.7, 0.5)]
+    deck = hull[8:] - np.array([0, 0, 0.08])
+    return [("paint", np.concatenate([hull[:8], deck])), ("wood", np.concatenate(benches))]
 
 
 def _swing(generator: np.random.Generator) -> list[Part]:
