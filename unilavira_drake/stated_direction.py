@@ -23,6 +23,9 @@ _PLAIN = {
     "to your right": -90.0,
     "behind you": 180.0,
 }
+_A_LITTLE = re.compile(r"\b(?:a little|slightly) to (?:your|the) (?:left|right)\b")
+SLIGHT = 12.0
+"""What ``a little to your left`` means, degrees."""
 _STATES = re.compile(r"\b(?:is|lies|located|stands|away|waits)\b")
 
 
@@ -55,4 +58,6 @@ def _bearing(sentence: str) -> float | None:
     if angle is not None:
         sign = 1.0 if angle.group(3) == "left" else -1.0
         return (-sign if angle.group(1) else sign) * float(angle.group(2))
+    if _A_LITTLE.search(sentence) and "ahead" in sentence:
+        return SLIGHT if "left" in sentence else -SLIGHT
     return next((value for words, value in _PLAIN.items() if words in sentence), None)

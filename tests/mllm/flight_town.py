@@ -118,12 +118,12 @@ def _cast(bounds, X_WC, pinhole_, width, height):
     depth, index = np.full((height, width), np.inf), np.full((height, width), -1)
     for v in range(height):
         for u in range(width):
-            ray = np.array([(u - pinhole_[2]) / pinhole_[0], (v - pinhole_[3]) / pinhole_[1], 1.0])
-            ray = X_WC[:3, :3] @ ray
+            x, y = (u - pinhole_[2]) / pinhole_[0], (v - pinhole_[3]) / pinhole_[1]
             for i in range(len(bounds)):
                 near, far = 0.0, np.inf
                 for axis in range(3):
-                    q = ray[axis] if abs(ray[axis]) > 1e-9 else 1e-9
+                    q = X_WC[axis, 0] * x + X_WC[axis, 1] * y + X_WC[axis, 2]
+                    q = q if abs(q) > 1e-9 else 1e-9
                     a = (bounds[i, 0, axis] - X_WC[axis, 3]) / q
                     b = (bounds[i, 1, axis] - X_WC[axis, 3]) / q
                     near, far = max(near, min(a, b)), min(far, max(a, b))

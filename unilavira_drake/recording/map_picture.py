@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from unilavira_drake.messages import OccupancyMap
+from unilavira_drake.messages import OccupancyMap, VoxelMap
 from unilavira_drake.recording import map_layers
 from unilavira_drake.recording.floor_plan import FloorPlan, floor_plan
 from unilavira_drake.recording.plan_labels import Lettering, room_labels, thing_labels
 from unilavira_drake.recording.trace import EpisodeTrace
+from unilavira_drake.recording.voxel_picture import top_view
 from unilavira_drake.worlds.world import World
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ _LETTER, _BOLD_LETTER = 0.58, 0.70
 def map_picture(
     world: World,
     trace: EpisodeTrace,
-    occupancy: OccupancyMap | None = None,
+    occupancy: OccupancyMap | VoxelMap | None = None,
     *,
     goals: tuple[tuple[float, float], ...] = (),
     goal_area: tuple[NDArray[np.float64], ...] = (),
@@ -56,7 +57,7 @@ def map_picture(
     Args:
         world: the true world.
         trace: the way.
-        occupancy: what was mapped.
+        occupancy: what was mapped; voxels are drawn as seen from above.
         goals: where the task's goal lies, metres in the world; none when it is not scored.
         goal_area: outlines, (k, 2) metres in the world, of the floor on which a stop succeeds.
         title: above the picture, wrapped.
@@ -67,6 +68,8 @@ def map_picture(
     point = 1.0 / 72.0 / scale
     _write_title(figure, lines)
     map_layers.draw_rooms(axes, plan)
+    if isinstance(occupancy, VoxelMap):
+        occupancy = top_view(occupancy)
     if occupancy is not None:
         map_layers.draw_occupancy(axes, occupancy)
     map_layers.draw_plan(axes, plan)

@@ -13,6 +13,7 @@ from unilavira_drake.messages import (
     Panorama,
     TodoList,
     VisionAction,
+    VoxelMap,
 )
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.mllm.reply import MllmReply
@@ -38,6 +39,10 @@ PORTS = {
 
 GROUNDER_PORTS = {"grounding": ("grounder", "grounding", Grounding())}
 """The same for what only an agent with an auxiliary grounder says."""
+
+
+FLIGHT_PORTS = {"map": ("mapper", "map", VoxelMap())}
+"""What an aircraft has in the place of those above."""
 
 
 class Recorder(LeafSystem):
@@ -67,12 +72,15 @@ class Recorder(LeafSystem):
         listener: called with (simulated seconds, system, event, message).
         period: the tick of the ring, seconds; the ports are read half a tick after it.
         grounder: whether the agent has an auxiliary grounder.
+        in_flight: whether the map is one of voxels.
     """
 
-    def __init__(self, listener: Listener, *, period: float, grounder: bool = False) -> None:
+    def __init__(
+        self, listener: Listener, *, period: float, grounder: bool = False, in_flight: bool = False
+    ) -> None:
         super().__init__()
         self._listener = listener
-        ports = PORTS | GROUNDER_PORTS if grounder else PORTS
+        ports = PORTS | (FLIGHT_PORTS if in_flight else {}) | (GROUNDER_PORTS if grounder else {})
         self._readers = tuple(
             (system, event, message_input(self, port, default))
             for port, (system, event, default) in ports.items()

@@ -2,7 +2,7 @@
 
 A line is ``{t, decision, system, event, data}`` in simulated time.  Floats are rounded to six
 digits; pictures stand as the SHA-256 of their file; arrays larger than a pose are left out.  An
-occupancy map is such a picture too, see ``occupancy_picture``.
+occupancy map is such a picture too, see ``occupancy_picture``; so is a voxel map, seen from above.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from unilavira_drake.messages import Frame, OccupancyMap
+from unilavira_drake.messages import Frame, OccupancyMap, VoxelMap
 from unilavira_drake.recording.occupancy_picture import PNG_MAGIC, occupancy_png
+from unilavira_drake.recording.voxel_picture import top_view
 
 DIGITS = 6
 LARGEST_ARRAY = 16
@@ -78,6 +79,8 @@ def _items(value: Any) -> Mapping[str, Any]:
         raise TypeError(f"a transcript holds messages, not {type(value).__name__}")
     if isinstance(value, Frame):
         return {name: getattr(value, name) for name in _FRAME_FIELDS}
+    if isinstance(value, VoxelMap):
+        return _items(top_view(value))
     items = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, OccupancyMap):
         items |= {"shape": value.shape, "image": occupancy_png(value)}

@@ -25,7 +25,7 @@ from unilavira_drake.report.setting import read_setting
 from unilavira_drake.report.sheet import Overlay, Sheet
 from unilavira_drake.report.words import action_words, outcome_words, reasoning, step_badges
 
-VIEW_ORDER = ("left", "front", "right", "back")
+VIEW_ORDER = ("left", "front", "right", "back", "down")
 """As one would turn the head: neighbours stand side by side."""
 
 

@@ -190,12 +190,14 @@ class Sheet:
         action, panorama = step.action, step.panorama
         if pose is None or panorama is None or action is None or action.tool != "turn":
             return ""
+        if action.direction not in VIEW_YAW:
+            return ""  # Straight down: a cone on a map has a bearing.
         frames = [frame for frame in panorama.frames if frame.view == action.direction]
         if not frames:
             return ""
         x, y, yaw = pose
         half = frames[0].intrinsics.horizontal_fov / 2
-        angles = yaw + VIEW_YAW.get(action.direction, 0.0) + np.linspace(-half, half, 9)
+        angles = yaw + VIEW_YAW[action.direction] + np.linspace(-half, half, 9)
         reach = _CONE / self._scale
         arc = np.column_stack([x + reach * np.cos(angles), y + reach * np.sin(angles)])
         return self._points(np.vstack([[x, y], arc]))

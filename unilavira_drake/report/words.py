@@ -28,7 +28,9 @@ def action_words(step: Step) -> str:
     if action is None:
         return "no action recorded"
     if action.tool == "turn":
-        return f"turn {action.direction}"
+        return f"turn {action.argument}"
+    if action.tool == "fly":
+        return f"fly {action.argument}"
     if action.tool == "backtrack":
         return f"drive back to waypoint {action.waypoint}"
     if action.tool == "go_stair":

@@ -105,7 +105,7 @@ def _allowed(move: Move, situation: FlightSituation) -> Move:
 def _analysis(situation: FlightSituation, progress: FlightProgress) -> str:
     done = len(situation.steps) - len(progress.pending)
     ground = situation.scene.ground or "unknown ground"
-    text = f"{situation.scene.height:.0f} m above the {ground}; {done} of {len(situation.steps)} "
+    text = f"{situation.height:.0f} m above the {ground}; {done} of {len(situation.steps)} "
     text += "legs done."
     if situation.variables.outcome.startswith("failed"):
         text += f" The last move {situation.variables.outcome}."
@@ -125,7 +125,7 @@ def _next_words(progress: FlightProgress) -> str:
 
 
 def _scene(situation: FlightSituation) -> str:
-    text = f"Above the {situation.scene.ground or 'ground'} at {situation.scene.height:.0f} m"
+    text = f"Above the {situation.scene.ground or 'ground'} at {situation.height:.0f} m"
     names = dict.fromkeys(s.name for s in sorted(situation.scene.sights, key=lambda s: s.away))
     for i, name in enumerate(names):
         extended = text + ("; sees " if i == 0 else ", ") + name

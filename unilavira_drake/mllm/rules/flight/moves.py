@@ -98,7 +98,7 @@ def _first_hard(progress: FlightProgress) -> int:
 
 
 def _to_height(situation: FlightSituation, leg: Leg) -> Move:
-    height = situation.scene.height
+    height = situation.height
     why = f"{leg.kind} from {height:.0f} m to {leg.height:.0f} m"
     return turn(DOWN, BELOW, height, 0.0, why, leg.height - height)
 

@@ -5,9 +5,16 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
+from unilavira_drake.messages import DOWN
 from unilavira_drake.mllm.rules.flight.legs import Leg
 from unilavira_drake.mllm.rules.flight.situation import LEVEL, FlightSituation, FlightStep
 
+NEAR_GOAL = 45.0
+"""So near to a stated place what was on the way to it no longer matters, metres."""
+NEXT = 40.0
+"""So near to the next landmark the one before it no longer matters, metres."""
+FAILED = 60.0
+"""What a failed move in a direction counts, metres."""
 ARRIVED = 20.0
 """So near to a stated place the search for the landmark itself begins, metres."""
 
@@ -33,6 +40,9 @@ def review_flight(situation: FlightSituation) -> FlightProgress:
     blocked = False
     for step in situation.pending:
         evidence = "" if blocked else _met(step, situation)
+        if not evidence and not blocked and _left_behind(step, situation):
+            moot.append(step)
+            continue
         if not evidence:
             waiting.append(step)
             blocked = blocked or step.leg.hard
@@ -42,6 +52,20 @@ def review_flight(situation: FlightSituation) -> FlightProgress:
             moot += waiting
             waiting = []
     return FlightProgress(tuple(closed), tuple(moot), tuple(waiting))
+
+
+def _left_behind(step: FlightStep, situation: FlightSituation) -> bool:
+    """Whether a landmark on the way need not be looked for any more.
+
+    It is out of sight, and the next one is near, or the stated place of the goal is.
+    """
+    after = next_landmark(step, situation.steps)
+    if not _ends_at_landmark(step.leg) or after is None or situation.scene.matching(step.leg):
+        return False
+    stated = situation.stated()
+    if stated is not None and stated[0] <= NEAR_GOAL:
+        return True
+    return any(sight.distance <= NEXT for sight in situation.scene.matching(after))
 
 
 def next_landmark(step: FlightStep, steps: tuple[FlightStep, ...]) -> Leg | None:
@@ -55,13 +79,13 @@ def _ends_at_landmark(leg: Leg) -> bool:
 
 def _met(step: FlightStep, situation: FlightSituation) -> str:
     """Returns the evidence that a leg is done, or nothing."""
-    leg, scene = step.leg, situation.scene
+    leg, height = step.leg, situation.height
     if leg.kind == "climb":
-        done = scene.height >= leg.height - LEVEL
-        return f"{scene.height:.0f} m above the ground" if done else ""
+        if situation.tried(DOWN) >= FAILED:
+            return "it cannot rise any more here"
+        return f"{height:.0f} m above the ground" if height >= leg.height - LEVEL else ""
     if leg.kind == "descend":
-        done = scene.height <= leg.height + LEVEL
-        return f"{scene.height:.0f} m above the ground" if done else ""
+        return f"{height:.0f} m above the ground" if height <= leg.height + LEVEL else ""
     if leg.kind == "turn":
         return ""
     if leg.kind in ("heading", "along"):

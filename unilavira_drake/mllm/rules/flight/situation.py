@@ -13,7 +13,7 @@ from unilavira_drake.mllm.rules.flight.legs import Leg
 from unilavira_drake.mllm.rules.flight.parser import parse_directive, plan_legs
 from unilavira_drake.mllm.rules.flight.scene import AirScene, LandmarkSight, look_around
 
-REACH = 15.0
+REACH = 12.0
 """A landmark this near, through the air, is reached, metres."""
 BESIDE_REACH = 9.0
 """One that stands as high as the aircraft: along the ground, metres."""
@@ -21,6 +21,11 @@ PASSING = 25.0
 """One that is only passed: along the ground, metres."""
 LEVEL = 2.5
 """A height is reached within this, metres."""
+
+
+MEASURED = 30.0
+"""Higher up the depth camera may not see the ground, metres."""
+_HEIGHT = re.compile(r"^Above the .* at (\d+) m")
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,18 @@ class FlightSituation:
         return next((w for w in self.variables.waypoints if w.id == current), None)
 
     @property
+    def height(self) -> float:
+        """Metres above the ground: measured, or where that is too far by the climb since the start.
+
+        The start's height stands in the sentence about it that an earlier reply left.
+        """
+        start = min(self.variables.waypoints, key=lambda w: w.id, default=None)
+        told = _HEIGHT.search(start.scene) if start is not None else None
+        if start is None or told is None or self.scene.height <= MEASURED:
+            return self.scene.height
+        return max(float(told.group(1)) - start.height, MEASURED)
+
+    @property
     def pending(self) -> tuple[FlightStep, ...]:
         """The steps still to be done, in order."""
         return tuple(step for step in self.steps if not step.done)
@@ -59,8 +76,7 @@ class FlightSituation:
             elif leg.kind in ("past", "go"):
                 there = sight.below or sight.distance <= PASSING
             else:
-                beside = sight.distance <= BESIDE_REACH or sight.below or sight.drop > 0.0
-                there = sight.away <= REACH and beside
+                there = sight.away <= REACH and (sight.distance <= BESIDE_REACH or sight.below)
             if there:
                 return sight
         return None
