@@ -45,7 +45,7 @@ from unilavira_drake.scenario import Scenario
 from unilavira_drake.scenario_loading import dump_scenario
 from unilavira_drake.task_choice import EpisodeTask, choose_task
 from unilavira_drake.worlds.load import load_world
-from unilavira_drake.worlds.start import parse_start
+from unilavira_drake.worlds.start import parse_start_pose
 from unilavira_drake.worlds.world import World
 
 ADVANCE = 1.0
@@ -80,12 +80,12 @@ def run_episode(
     """
     task = choose_task(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
-    start = parse_start(task.start, world, radius=scenario.robot.turning_radius)
+    start = parse_start_pose(task.start, world, radius=scenario.robot.turning_radius)
     goal = None
     if task.goal:
         goal = make_goal(task.goal, world, task.rule, radius=scenario.robot.radius)
     if goal is not None:
-        shortest_path(goal, *start[:2])
+        shortest_path(goal, *start[:3])
     tally, trace = Tally(), EpisodeTrace()
     listeners: list[Listener] = [tally.record, trace.record]
     if on_event is not None:
@@ -146,14 +146,14 @@ def _verdict(
     task: EpisodeTask,
     episode: _Run,
     goal: GoalField | None,
-    start: tuple[float, float, float],
+    start: tuple[float, float, float, float],
     tally: Tally,
 ) -> Score:
     """Scores what the agent did; what UNSCORED lists is not the agent's doing."""
     metrics = episode.metrics
     if metrics.cause in UNSCORED:
         return Score(path_length_m=metrics.path_length)
-    verdict = score(goal, metrics, start[:2], episode.output("observer", "panorama"), task.rule)
+    verdict = score(goal, metrics, start[:3], episode.output("observer", "panorama"), task.rule)
     if not (task.rule.by_answer and task.answers):
         return verdict
     return score_answer(
@@ -168,8 +168,9 @@ def _verdict(
 def _map(
     world: World, trace: EpisodeTrace, episode: _Run, goal: GoalField | None, task: EpisodeTask
 ) -> bytes:
+    place = episode.output("station", "cheat_X_WB").translation()
     return map_picture(
-        world,
+        world.storey(float(place[2])),
         trace,
         episode.output("navigation", "map"),
         goals=() if goal is None else goal.places,
