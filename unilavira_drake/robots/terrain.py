@@ -19,10 +19,9 @@ from unilavira_drake.robots.planar_base import BASE_JOINTS, HEIGHT_JOINT
 GroundHeight = Callable[[float, float, float], float]
 """(x, y, z) -> height of the ground there nearest to z, metres in the world."""
 
-STIFFNESS, DAMPING = 2.0e5, 2.0e4
-"""Gains of the height joint, N/m and N s/m: a tenth of a second behind the ground."""
-EFFORT = 1.0e5
-"""N."""
+STIFFNESS, DAMPING, EFFORT = 400.0, 40.0, 1000.0
+"""Gains and limit of the height joint for each kilogram that it carries, N/m, N s/m and N: it is a
+tenth of a second behind the ground."""
 
 
 class TerrainFollower(LeafSystem):
@@ -103,12 +102,13 @@ def climbing_model(text: str) -> str:
         raise ValueError("the model has no joint base_yaw that could carry a height joint")
     body, child.text = child.text, "lift"
     ElementTree.register_namespace("drake", "drake.mit.edu")
-    for part in _lift(str(body)):
+    mass = sum(float(one.text or 0.0) for one in model.iterfind("link/inertial/mass"))
+    for part in _lift(str(body), mass):
         model.append(part)
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _lift(body: str) -> tuple[ElementTree.Element, ...]:
+def _lift(body: str, mass: float) -> tuple[ElementTree.Element, ...]:
     zeros = "".join(f"<{name}>0</{name}>" for name in ("ixy", "ixz", "iyz"))
     own = "".join(f"<{name}>0.01</{name}>" for name in ("ixx", "iyy", "izz"))
     link = (
@@ -118,8 +118,8 @@ def _lift(body: str) -> tuple[ElementTree.Element, ...]:
     joint = (
         f'<joint name="{HEIGHT_JOINT}" type="prismatic" xmlns:drake="drake.mit.edu">'
         f"<parent>lift</parent><child>{body}</child>"
-        f"<axis><xyz>0 0 1</xyz><limit><effort>{EFFORT:g}</effort></limit></axis>"
-        f'<drake:controller_gains p="{STIFFNESS:g}" d="{DAMPING:g}"/></joint>'
+        f"<axis><xyz>0 0 1</xyz><limit><effort>{EFFORT * mass:g}</effort></limit></axis>"
+        f'<drake:controller_gains p="{STIFFNESS * mass:g}" d="{DAMPING * mass:g}"/></joint>'
     )
     return ElementTree.fromstring(link), ElementTree.fromstring(joint)
 
