@@ -28,7 +28,7 @@ from unilavira_drake.station import make_navigation_station
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.wiring import Wiring
 from unilavira_drake.worlds.load import load_world
-from unilavira_drake.worlds.start import parse_start
+from unilavira_drake.worlds.start import parse_start_pose
 
 FRAMES_KEPT = 16
 """Frames whose detections are remembered; a panorama re-issued under a new number costs none."""
@@ -69,14 +69,18 @@ def make_navigation_diagram(
         load_world(scenario.world.name, mirror=scenario.world.mirror), scenario.people
     )
     task = choose_task(scenario)
-    start = parse_start(task.start, world, radius=scenario.robot.turning_radius)
+    x, y, height, yaw = parse_start_pose(task.start, world, radius=scenario.robot.turning_radius)
     intrinsics = front_intrinsics(scenario.robot)
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))
     wiring.add(
         "station",
         lambda: make_navigation_station(
-            scenario, world=world, start=start, locomotion=own.pop("locomotion", None)
+            scenario,
+            world=world,
+            start=(x, y, yaw),
+            start_height=height,
+            locomotion=own.pop("locomotion", None),
         ),
     )
     wiring.add(

@@ -168,8 +168,9 @@ def _verdict(
 def _map(
     world: World, trace: EpisodeTrace, episode: _Run, goal: GoalField | None, task: EpisodeTask
 ) -> bytes:
+    place = episode.output("station", "cheat_X_WB").translation()
     return map_picture(
-        world,
+        world.storey(float(place[2])),
         trace,
         episode.output("navigation", "map"),
         goals=() if goal is None else goal.places,

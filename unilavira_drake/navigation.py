@@ -80,7 +80,7 @@ def _make_ground_navigation(
     wiring.connect("mapper", "map", "governor")
     wiring.connect("planner", "path", "controller")
     wiring.connect("controller", "desired_command", "governor")
-    wiring.take_input("goal", "planner")
+    wiring.take_input("goal", *(("planner", "mapper") if robot.can_climb else ("planner",)))
     wiring.take_input("panorama", "mapper")
     wiring.take_input("sweep", "controller")
     wiring.take_input("front.depth_image", "mapper")
@@ -129,6 +129,7 @@ def _add_mapper_and_planner(
             stuck_time=planning.stuck_time,
             travel_factor=planning.travel_factor,
             patience=planning.patience,
+            can_climb=robot.can_climb,
             period=tick,
         ),
     )

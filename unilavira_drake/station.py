@@ -18,7 +18,9 @@ from unilavira_drake.people.crowd import Person, make_crowd, with_people
 from unilavira_drake.raster import raster_works
 from unilavira_drake.resources import package_xml
 from unilavira_drake.robots.actuation import add_actuation, set_start
+from unilavira_drake.robots.planar_base import HEIGHT_JOINT
 from unilavira_drake.robots.robot import Robot
+from unilavira_drake.robots.terrain import climbing_model, follow_terrain
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.sensors.rig import add_renderer
 from unilavira_drake.station_cameras import (
@@ -30,7 +32,7 @@ from unilavira_drake.station_cameras import (
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.scenery import add_scenery, lights
-from unilavira_drake.worlds.start import parse_start
+from unilavira_drake.worlds.start import parse_start_pose
 from unilavira_drake.worlds.world import World
 
 
@@ -53,11 +55,11 @@ def add_navigation_station(
         ScenarioError: if the world's file cannot be used.
         TaskError: if the start cannot be used.
     """
-    start = None
+    start, height = None, 0.0
     if X_WB_start is not None:
-        x, y, _ = X_WB_start.translation()
+        x, y, height = X_WB_start.translation()
         start = (x, y, X_WB_start.rotation().ToRollPitchYaw().yaw_angle())
-    station = make_navigation_station(scenario, world=world, start=start)
+    station = make_navigation_station(scenario, world=world, start=start, start_height=height)
     builder.AddSystem(station)
     return station
 
@@ -67,6 +69,7 @@ def make_navigation_station(
     *,
     world: World | None = None,
     start: tuple[float, float, float] | None = None,
+    start_height: float = 0.0,
     locomotion: System | None = None,
 ) -> Diagram:
     """Returns the Diagram ``station``: plant, scene graph, cameras and actuation.
@@ -95,6 +98,7 @@ def make_navigation_station(
         scenario: what to build.
         world: read from the scenario when None.
         start: x, y (metres) and yaw (radians); the chosen task's start when None.
+        start_height: of the floor at ``start``, metres; only a robot that climbs is not at 0.
         locomotion: a System in the place of the robot's own, see ``add_actuation``.
 
     Raises:
@@ -104,16 +108,17 @@ def make_navigation_station(
     if world is None:
         world = load_world(scenario.world.name, mirror=scenario.world.mirror)
     if start is None:
-        start = parse_start(
+        x, y, start_height, yaw = parse_start_pose(
             choose_task(scenario).start, world, radius=scenario.robot.turning_radius
         )
+        start = (x, y, yaw)
     builder = DiagramBuilder()
     world = with_people(world, scenario.people)
     people = make_crowd(scenario.people, world, seed=scenario.random_seed, robot=start[:2])
     plant, scene_graph, model_instance = _add_scene(builder, scenario, world, people)
     robot = scenario.robot
-    set_start(plant, model_instance, robot, start)
-    add_actuation(builder, plant, model_instance, robot, locomotion)
+    set_start(plant, model_instance, robot, start, start_height)
+    add_actuation(builder, plant, model_instance, robot, locomotion, world.ground_height)
     base = plant.GetBodyByName("base", model_instance)
     if people:
         connect_people(builder, plant, people, scenario.people, base, (robot.length, robot.width))
@@ -134,9 +139,11 @@ def _add_scene(
     builder: DiagramBuilder, scenario: Scenario, world: World, people: tuple[Person, ...]
 ) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
     plant, scene_graph = AddMultibodyPlant(scenario.plant, builder)
-    add_scenery(plant, scene_graph, world)
+    ground = add_scenery(plant, scene_graph, world)
     model_instance = _add_robot(plant, scenario.robot)
     add_people(plant, scene_graph, people)
+    if plant.HasJointNamed(HEIGHT_JOINT, model_instance):
+        follow_terrain(plant, scene_graph, model_instance, ground)
     plant.Finalize()
     return plant, scene_graph, model_instance
 
@@ -145,12 +152,15 @@ def _add_robot(plant: MultibodyPlant, robot: Robot) -> ModelInstanceIndex:
     model = robot.model or f"package://unilavira_drake/robots/{robot.name}.sdf"
     parser = Parser(plant)
     parser.package_map().AddPackageXml(package_xml())
-    if "://" in model:
-        (model_instance,) = parser.AddModelsFromUrl(model)
-    elif Path(model).is_file():
-        (model_instance,) = parser.AddModels(Path(model))
-    else:
+    known = "://" in model
+    path = Path(parser.package_map().ResolveUrl(model) if known else model)
+    if not path.is_file():
         raise ScenarioError(f"robot.model: no file {model!r}; check the path.")
+    if robot.can_climb:
+        text = climbing_model(path.read_text(encoding="utf-8"))
+        (model_instance,) = parser.AddModelsFromString(text, "sdf")
+    else:
+        (model_instance,) = parser.AddModelsFromUrl(model) if known else parser.AddModels(path)
     return model_instance
 
 

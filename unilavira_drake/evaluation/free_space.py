@@ -17,11 +17,13 @@ SLACK = 0.4
 """A robot this near to free floor is on it: it may brush what its radius keeps clear, metres."""
 
 
-def free_space(world: World, *, radius: float, resolution: float = 0.05) -> FreeSpace:
-    """Returns the floor of the rooms on which a robot of this radius can stand.
+def free_space(
+    world: World, *, radius: float, resolution: float = 0.05, elevation: float = 0.0
+) -> FreeSpace:
+    """Returns the floor of a storey's rooms on which a robot of this radius can stand.
 
     Of several pieces that are not connected the largest is taken: a robot that stands in it
-    never sees the others.
+    never sees the others.  ``elevation`` is the height of the storey's floor, metres.
 
     Raises:
         TaskError: if there is no such floor.
@@ -29,12 +31,12 @@ def free_space(world: World, *, radius: float, resolution: float = 0.05) -> Free
     x_min, y_min = (min(room.rectangle[i] for room in world.rooms) for i in (0, 1))
     x_max, y_max = (max(room.rectangle[i] for room in world.rooms) for i in (2, 3))
     space = rasterize(
-        [box.corners() for _, box in obstacles(world)],
+        [box.corners() for _, box in obstacles(world, elevation)],
         bounds=(x_min, y_min, x_max, y_max),
         resolution=resolution,
         inflation=radius,
     )
-    pieces, count = ndimage.label(space.free & in_rooms(space, world))
+    pieces, count = ndimage.label(space.free & in_rooms(space, world, None, elevation))
     if count == 0:
         raise TaskError(
             f"world {world.name!r}: no floor for a robot of radius {radius:.2f} m; "
@@ -45,15 +47,21 @@ def free_space(world: World, *, radius: float, resolution: float = 0.05) -> Free
 
 
 def in_rooms(
-    space: FreeSpace, world: World, names: tuple[str, ...] | None = None
+    space: FreeSpace,
+    world: World,
+    names: tuple[str, ...] | None = None,
+    elevation: float = 0.0,
 ) -> NDArray[np.bool_]:
-    """Returns (rows, columns) bool: cells whose centres lie in the named rooms, or in any."""
+    """Returns (rows, columns) bool: cells whose centres lie in the named rooms, or in any.
+
+    Only the rooms of the storey whose floor is at ``elevation`` count, metres.
+    """
     rows, columns = space.free.shape
     x = space.origin[0] + (np.arange(columns) + 0.5) * space.resolution
     y = space.origin[1] + (np.arange(rows) + 0.5) * space.resolution
     inside = np.zeros((rows, columns), np.bool_)
     for room in world.rooms:
-        if names is None or room.name in names:
+        if room.elevation == elevation and (names is None or room.name in names):
             x_min, y_min, x_max, y_max = room.rectangle
             inside |= np.outer((y >= y_min) & (y < y_max), (x >= x_min) & (x < x_max))
     return inside

@@ -41,6 +41,8 @@ class GoalTarget(Message):
     """Metres in the world, for a point."""
     height: float = 0.0
     """Of a point, metres; for flights."""
+    elevation: float = 0.0
+    """Height of the floor on which the robot has to end, metres."""
 
     def place(self, world: World) -> tuple[float, float]:
         """Returns the middle of the target on the floor, metres in the world."""
@@ -79,7 +81,8 @@ def footprint(target: GoalTarget, world: World, space: FreeSpace) -> NDArray[np.
     Raises:
         TaskError: if no free floor is near.
     """
-    cells = np.argwhere(space.free & in_rooms(space, world, target.rooms))
+    inside = in_rooms(space, world, target.rooms, target.elevation)
+    cells = np.argwhere(space.free & inside)
     points = centers(space, cells)
     gaps = _gaps(target, world, points)
     nearest = float(gaps.min(initial=math.inf))
@@ -99,10 +102,11 @@ def _resolve(text: str, world: World) -> GoalTarget:
     thing = world.object(text)
     if thing is not None:
         rooms = tuple(thing.room.split("|"))
-        return GoalTarget(text, "instance", rooms, world.label_of(text))
+        elevation = min(room.elevation for room in world.rooms if room.name in rooms)
+        return GoalTarget(text, "instance", rooms, world.label_of(text), elevation=elevation)
     room = world.room(text) or world.room(text.replace("_", " "))
     if room is not None:
-        return GoalTarget(text, "room", (room.name,))
+        return GoalTarget(text, "room", (room.name,), elevation=room.elevation)
     if "," in text:
         return _point(text, world)
     names = {thing.name for thing in world.objects}
@@ -118,13 +122,20 @@ def _point(text: str, world: World) -> GoalTarget:
     if len(numbers) not in (2, 3) or not all(math.isfinite(number) for number in numbers):
         raise TaskError(f"goal: {text!r} is not X,Y[,Z]: two or three numbers in metres.")
     x, y = numbers[0], -numbers[1] if world.mirrored else numbers[1]
-    room = world.room_at(x, y)
+    room = world.room_at(x, y, numbers[2] if len(numbers) == 3 else 0.0)
     if room is None:
         raise TaskError(
             f"goal: {text!r} is outside the world {world.name!r}; give a point inside a room: "
             f"{', '.join(sorted(room.name for room in world.rooms))}."
         )
-    return GoalTarget(text, "point", (room.name,), point=(x, y), height=(*numbers, 0.0)[2])
+    return GoalTarget(
+        text,
+        "point",
+        (room.name,),
+        point=(x, y),
+        height=(*numbers, 0.0)[2],
+        elevation=room.elevation,
+    )
 
 
 def _gaps(target: GoalTarget, world: World, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ def success_area(goal: GoalField, rule: SuccessRule = HOME_RULE) -> tuple[NDArra
         space = field.space
         near = field.times * space.resolution <= rule.radius
         rooms = target.rooms if rule.in_room else None
-        mask = (near & in_rooms(space, goal.world, rooms)).astype(np.uint8)
+        mask = (near & in_rooms(space, goal.world, rooms, target.elevation)).astype(np.uint8)
         contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         for contour in contours:
             cells = cv2.approxPolyDP(contour, 1.0, True)[:, 0, :]

@@ -18,6 +18,7 @@ import numpy as np
 from unilavira_drake.errors import TaskError
 from unilavira_drake.evaluation.free_space import free_space, path_distance, quick_distance
 from unilavira_drake.evaluation.goal import GoalTarget, footprint, resolve_goal
+from unilavira_drake.evaluation.stair_ways import StoreyedField
 from unilavira_drake.messages import Message, Panorama
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.planning.geodesic import GeodesicField
@@ -38,6 +39,9 @@ class GoalField(Message):
     world: World = World()
     targets: tuple[GoalTarget, ...] = ()
     fields: tuple[GeodesicField, ...] = ()
+    """On the storey of each alternative."""
+    ways: tuple[StoreyedField, ...] = ()
+    """Over stairs too; empty in a world of one storey."""
 
     @property
     def places(self) -> tuple[tuple[float, float], ...]:
@@ -46,15 +50,19 @@ class GoalField(Message):
 
     def distances(self, x: float, y: float, z: float = 0.0) -> tuple[float, ...]:
         """Returns the geodesic distance to each alternative, metres; inf where there is no way."""
+        if self.ways:
+            return tuple(way.distance(x, y, z, path_distance) for way in self.ways)
         return tuple(path_distance(field, x, y) for field in self.fields)
 
     def distance(self, x: float, y: float, z: float = 0.0) -> float:
         """Returns the distance to the nearest alternative, metres: a few percent long, and fast."""
+        if self.ways:
+            return min(way.distance(x, y, z, quick_distance) for way in self.ways)
         return min(quick_distance(field, x, y) for field in self.fields)
 
     def way_from(self, x: float, y: float, z: float = 0.0) -> float:
         """Returns the length of the shortest way from a start, metres; see ``shortest_path``."""
-        space = self.fields[0].space
+        space = self.ways[0].space(z) if self.ways else self.fields[0].space
         beside = (-space.resolution, 0.0, space.resolution)
         # A start up to one cell beside free floor is free: the border of the grid is that coarse.
         if not any(space.is_free(x + dx, y + dy) for dx in beside for dy in beside):
@@ -98,11 +106,23 @@ def make_goal_field(
     if resolution is None:
         resolution = 0.25 if world.outdoors else 0.05
     targets = resolve_goal(goal, world)
-    space = free_space(world, radius=radius, resolution=resolution)
+    spaces = {
+        elevation: free_space(world, radius=radius, resolution=resolution, elevation=elevation)
+        for elevation in world.elevations
+    }
     fields = tuple(
-        GeodesicField.to_cells(space, footprint(target, world, space)) for target in targets
+        GeodesicField.to_cells(
+            spaces[target.elevation], footprint(target, world, spaces[target.elevation])
+        )
+        for target in targets
     )
-    return GoalField(world, targets, fields)
+    if len(spaces) == 1:
+        return GoalField(world, targets, fields)
+    ways = tuple(
+        StoreyedField.of(world, spaces, target.elevation, field, radius=radius)
+        for target, field in zip(targets, fields, strict=True)
+    )
+    return GoalField(world, targets, fields, ways)
 
 
 def shortest_path(goal: GoalField, x: float, y: float, z: float = 0.0) -> float:
@@ -143,7 +163,7 @@ def score(
     nearest = goal.targets[distances.index(error)]
     success = stopped and any(
         rule.reached(distance)
-        and (not rule.in_room or in_room(target, goal.world, x, y))
+        and (not rule.in_room or in_room(target, goal.world, x, y, metrics.z))
         and (not rule.seen or seen(target, panorama) is not False)
         for target, distance in zip(goal.targets, distances, strict=True)
     )
@@ -159,15 +179,15 @@ def score(
         shortest_path_m=shortest if math.isfinite(shortest) else None,
         spl=spl,
         oracle_success=rule.reached(min(closest, error)),
-        same_room=in_room(nearest, goal.world, x, y),
+        same_room=in_room(nearest, goal.world, x, y, metrics.z),
         goal_seen=seen(nearest, panorama),
         notes=notes,
     )
 
 
-def in_room(target: GoalTarget, world: World, x: float, y: float) -> bool:
+def in_room(target: GoalTarget, world: World, x: float, y: float, z: float = 0.0) -> bool:
     """Whether a floor point lies in (one of) the target's rooms."""
-    room = world.room_at(x, y)
+    room = world.room_at(x, y, z)
     return room is not None and room.name in target.rooms
 
 

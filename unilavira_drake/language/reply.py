@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 from unilavira_drake.answer_words import chosen
 from unilavira_drake.errors import ReplyFormatError
@@ -177,7 +178,7 @@ def _decision(
         n=request.n,
         call=request.call,
         tool=action.tool,
-        direction=action.direction if isinstance(action, Turn | FlightTurn) else "",
+        direction=_direction(action),
         waypoint=action.waypoint if isinstance(action, Backtrack) else None,
         stair=action.stair if isinstance(action, GoStair) else "",
         climb=action.climb if isinstance(action, FlightTurn | Fly) else None,
@@ -189,6 +190,13 @@ def _decision(
         reasoning_action=clipped(reply.reasoning_action, REASONING_LIMIT),
         scene=clipped(reply.scene, SCENE_LIMIT),
     )
+
+
+def _direction(action: Any) -> str:
+    """Returns the view that an action names, or nothing."""
+    if isinstance(action, GoStair):
+        return action.direction or ""
+    return action.direction if isinstance(action, Turn | FlightTurn) else ""
 
 
 def _check_turn(action: Turn | FlightTurn, call: str, variables: LanguageVariables) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
+
+import numpy as np
 
 from unilavira_drake.language.bearings import direction_note
 from unilavira_drake.messages import (
@@ -21,6 +24,7 @@ from unilavira_drake.messages import (
 )
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.request import (
+    OTHER_FLOOR,
     VIEW_LABEL,
     DecisionNote,
     ImagePart,
@@ -30,6 +34,9 @@ from unilavira_drake.mllm.request import (
     WaypointNote,
 )
 from unilavira_drake.tasks import TaskSpec
+
+FLOORS_APART = 1.2
+"""A place higher or lower than this is on another floor, metres."""
 
 
 def language_request(
@@ -61,7 +68,7 @@ def language_request(
         family=task.family,
         task=task.text,
         views=tuple(
-            ViewNote(direction, round(free_distance(panorama.frame(direction)), 2))
+            ViewNote(direction, round(free_distance(_over_floor(panorama, direction)), 2))
             for direction in panorama.directions
         ),
         last_action=_last_action(last_action, history),
@@ -102,6 +109,16 @@ def language_request(
         if detector is None
         else tuple(detector(panorama.frame(direction)) for direction in panorama.directions),
     )
+
+
+def _over_floor(panorama: Panorama, direction: str) -> Frame:
+    """Returns a view with its height counted from the floor, also on an upper one."""
+    frame, floor = panorama.frame(direction), panorama.position[2]
+    if panorama.in_flight or floor == 0.0:
+        return frame
+    X_WC = np.array(frame.X_WC)
+    X_WC[2, 3] -= floor
+    return dataclasses.replace(frame, X_WC=X_WC)
 
 
 _NOT_A_MOVE = {
@@ -151,6 +168,8 @@ def _waypoint_note(
     dx, dy = waypoint.position[0] - x, waypoint.position[1] - y
     front = _front(waypoint, panorama, history)
     target, scene = waypoint.caption
+    if not panorama.in_flight and abs(waypoint.position[2] - z) > FLOORS_APART:
+        scene = OTHER_FLOOR + scene
     return WaypointNote(
         id=waypoint.id,
         distance=round(math.hypot(dx, dy), 2),

@@ -6,9 +6,12 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
 from unilavira_drake.mapping.flight_goals import FlightGoals, flight_goal, flown_goal
+from unilavira_drake.mapping.flights import find_flight
 from unilavira_drake.mapping.projection import Projection, project_box, project_point
+from unilavira_drake.mapping.storeys import SAME_STOREY
 from unilavira_drake.messages import (
     NO_TARGET,
+    STAIR_KINDS,
     Frame,
     Goal,
     History,
@@ -19,7 +22,8 @@ from unilavira_drake.messages import (
 )
 from unilavira_drake.ports import message_input
 
-NO_STAIRS = "stairs: not possible for this robot or here"
+NO_STAIRS = "no stairs"
+"""Begins the reason why ``go_stair`` gives no goal."""
 
 
 def select_goal(
@@ -33,33 +37,43 @@ def select_goal(
 ) -> Goal:
     """Returns the goal of a language action, or ``Goal(0)`` while its inputs are incomplete.
 
-    ``turn`` goes to what the vision action selected; ``backtrack`` to the waypoint, to face its
-    stored heading; ``stay`` and ``double_check`` stay; ``none``, ``go_stair`` and a vision action
-    without a selection give no goal, with the reason; ``stop`` gives no goal at all: the ring
-    rests.  In flight, that is with a view straight down, ``turn`` keeps off what was selected as
-    ``flight`` says (``flight_goals``), and ``fly`` goes where its numbers say.
+    ``turn`` goes to what the vision action selected; ``go_stair`` to the foot of the stairs that
+    begin there, and over them; ``backtrack`` to the waypoint, to face its stored heading, if it is
+    on the same storey; ``stay`` and ``double_check`` stay; ``none``, a vision action without a
+    selection and stairs that are not seen well give no goal, with the reason; ``stop`` gives no
+    goal at all: the ring rests.  In flight, that is with a view straight down, ``turn`` keeps off
+    what was selected as ``flight`` says (``flight_goals``), and ``fly`` goes where its numbers say.
     """
     n = action.n
     if n == 0 or n != panorama.n or action.tool == "stop":
         return Goal(0)
     if action.tool in ("stay", "double_check"):
         return Goal(n, "stay")
-    if action.tool == "go_stair":
-        return Goal(n, "none", reason=NO_STAIRS)
     if action.tool == "backtrack":
-        if history.n != n:
-            return Goal(0)
-        waypoint = history.waypoint(action.waypoint) if action.waypoint is not None else None
-        if waypoint is None:
-            return Goal(n, "none", reason=f"unknown waypoint {action.waypoint}")
-        return Goal(n, "go", p_WG=waypoint.position, heading=waypoint.heading)
+        return _waypoint(action, history, panorama) if history.n == n else Goal(0)
     if action.tool == "fly":
         return flown_goal(action, panorama, flight)
-    if action.tool != "turn":
+    if action.tool not in ("turn", "go_stair"):
         return Goal(n, "none", reason=action.reason or "no usable action")
     if vision.n != n:
         return Goal(0)
+    if action.tool == "go_stair":
+        return _stairs(n, action, vision, panorama)
     return _selected(action, vision, panorama, max_range, flight)
+
+
+def _waypoint(action: LanguageAction, history: History, panorama: Panorama) -> Goal:
+    n, waypoint = action.n, None
+    if action.waypoint is not None:
+        waypoint = history.waypoint(action.waypoint)
+    if waypoint is None:
+        return Goal(n, "none", reason=f"unknown waypoint {action.waypoint}")
+    rise = abs(waypoint.position[2] - panorama.position[2])
+    if rise > SAME_STOREY and not panorama.in_flight:
+        return Goal(
+            n, "none", reason=f"waypoint {waypoint.id} is on another floor; take the stairs"
+        )
+    return Goal(n, "go", p_WG=waypoint.position, heading=waypoint.heading)
 
 
 def _selected(
@@ -81,6 +95,32 @@ def _selected(
     if projection.p_WG is None:
         return Goal(n, "none", reason=f"{NO_TARGET}: {projection.reason}")
     return Goal(n, "go", p_WG=projection.p_WG, pixel=projection.pixel)
+
+
+def _stairs(n: int, action: LanguageAction, vision: VisionAction, panorama: Panorama) -> Goal:
+    direction = vision.direction or action.direction or "front"
+    try:
+        frame = panorama.frame(direction)
+    except KeyError:
+        return Goal(n, "none", reason=f"{NO_STAIRS}: there is no view {direction!r}")
+    if vision.box is not None:
+        u_min, v_min, u_max, v_max = vision.box
+    elif vision.point is not None:
+        (u_min, v_min), (u_max, v_max) = vision.point, vision.point
+    else:
+        why = vision.reason or "nothing was selected"
+        return Goal(n, "none", reason=f"{NO_STAIRS}: {why}")
+    floor = panorama.position[2]
+    flight = find_flight(frame, (u_min, u_max), action.stair, floor)
+    if flight.foot is None:
+        return Goal(n, "none", reason=f"{NO_STAIRS}: {flight.reason}")
+    return Goal(
+        n,
+        STAIR_KINDS[action.stair],
+        p_WG=(*flight.foot, floor),
+        heading=flight.heading,
+        pixel=((u_min + u_max) / 2, (v_min + v_max) / 2),
+    )
 
 
 def _projected(vision: VisionAction, frame: Frame, max_range: float) -> Projection:

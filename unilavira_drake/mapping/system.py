@@ -14,8 +14,16 @@ from pydrake.systems.sensors import ImageDepth32F
 from unilavira_drake.mapping.depth_scan import warm_up
 from unilavira_drake.mapping.depth_view import DepthView
 from unilavira_drake.mapping.occupancy import NEWEST, MappingParameters, integrate
+from unilavira_drake.mapping.stair_corridor import StairCorridor, corridor_at
 from unilavira_drake.mapping.storeys import Storey, Storeys
-from unilavira_drake.messages import Intrinsics, Message, OccupancyMap, Panorama
+from unilavira_drake.messages import (
+    STAIR_KINDS,
+    Goal,
+    Intrinsics,
+    Message,
+    OccupancyMap,
+    Panorama,
+)
 from unilavira_drake.ports import (
     Level,
     image_input,
@@ -48,7 +56,9 @@ class OccupancyMapper(Level):
 
     Heights count from the plane on which the base stands, so slopes are floor to a robot that
     tilts with them.  ``map`` is that of the storey where the robot is; its version goes on counting
-    when that is another one, see :mod:`unilavira_drake.mapping.storeys`.
+    when that is another one, see :mod:`unilavira_drake.mapping.storeys`.  While ``goal`` is a way
+    over stairs and the robot is on it, steps are a free corridor, and only what stands in the
+    corridor is an obstacle, see :mod:`unilavira_drake.mapping.stair_corridor`.
 
     .. pydrake_system::
 
@@ -58,6 +68,7 @@ class OccupancyMapper(Level):
         - front.depth_image
         - front.X_BC
         - pose_estimate
+        - goal (optional)
         output_ports:
         - map
 
@@ -116,6 +127,7 @@ class OccupancyMapper(Level):
         self._depth_image = image_input(self, "front.depth_image", ImageDepth32F)
         self._X_BC = pose_input(self, "front.X_BC")
         self._pose = pose_input(self, "pose_estimate")
+        self._goal = message_input(self, "goal", Goal())
         self.declare_output("map", lambda state: state.occupancy, OccupancyMap())
         warm_up()
 
@@ -139,7 +151,22 @@ class OccupancyMapper(Level):
         image = self._depth_image(context)
         X_WC = pose_matrix(self._pose(context) @ self._X_BC(context))
         views = (DepthView(pixels(image)[:, :, 0], self._intrinsics, X_WC),)
+        corridor = self._corridor(context, state, X_WB)
+        if corridor is not None:
+            views = (corridor.seen(views[0]),)
+            state = _freed(state, corridor)
         return self._integrated(context, state, X_WB, X_WB, views, state.occupancy.n)
+
+    def _corridor(
+        self, context: Context, state: MapperState, X_WB: NDArray[np.float64]
+    ) -> StairCorridor | None:
+        """Returns the stairs on which the robot is; None while it is on none."""
+        goal = self._goal.optional(context)
+        if goal is None or goal.kind not in STAIR_KINDS.values() or goal.n != state.occupancy.n:
+            return None
+        width = self._parameters.footprint_radius
+        place = (float(X_WB[0, 3]), float(X_WB[1, 3]), float(X_WB[2, 3]) - self._base_height)
+        return corridor_at(goal, place, half_width=width)
 
     def _due(self, time: float, state: MapperState, X_WB: NDArray[np.float64]) -> bool:
         if time - state.time >= self._rest_period - 1e-9:
@@ -181,6 +208,14 @@ class OccupancyMapper(Level):
         # The versions of all storeys are one count.
         occupancy = dc.replace(occupancy, version=state.occupancy.version + 1)
         return MapperState(occupancy, storeys.mapped(occupancy), position, _yaw(X_WB), time)
+
+
+def _freed(state: MapperState, corridor: StairCorridor) -> MapperState:
+    """Returns the state with the cells of the stairs around the robot free."""
+    here = state.storeys.occupancy
+    if here.version == 0:
+        return state
+    return dc.replace(state, storeys=state.storeys.mapped(corridor.freed(here)))
 
 
 def _yaw(X_WB: NDArray[np.float64]) -> float:

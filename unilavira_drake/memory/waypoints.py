@@ -105,6 +105,10 @@ def with_picture(
     )
 
 
+OTHER_FLOOR = 1.2
+"""A waypoint higher or lower than this is on another floor, metres."""
+
+
 def remember(
     state: WaypointState,
     panorama: Panorama,
@@ -241,7 +245,13 @@ def _second_chance(
     returned: Edge | None,
     window: tuple[KeyPicture, ...],
 ) -> SecondChance:
-    offers = tuple(w.id for w in state.history.waypoints if w.id != current)
+    # Nobody backtracks over stairs; who flies does not need any.
+    here, flies = panorama.position[2], panorama.in_flight
+    offers = tuple(
+        w.id
+        for w in state.history.waypoints
+        if w.id != current and (flies or abs(w.position[2] - here) <= OTHER_FLOOR)
+    )
     failed = tuple(edge for edge in edges if edge.failed)
     if returned is None:
         return SecondChance(n, offers, failed)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.messages.frozen import Message, read_only
+
+STAIR_KINDS = {"up": "climb", "down": "descend"}
+"""Kind of goal by the argument of ``go_stair``."""
 
 TERMINAL_STATES = ("arrived", "failed")
 ALREADY_THERE = "already there"
@@ -22,6 +26,7 @@ ON_THE_WAY = "on the way"
 class Goal(Message):
     """The one goal of language action ``n``: ``go`` to ``p_WG``, ``stay``, or ``none``.
 
+    ``climb`` and ``descend`` are stairs that begin at ``p_WG`` and lead along ``heading``.
     ``none`` has a reason.  ``heading``, when given, is the world yaw at which the next sweep
     starts.
     """
@@ -71,6 +76,8 @@ class Path(Message):
     """Counts the replans of this goal."""
     p_WP: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
     """(k, 2) float64, in the air (k, 3), metres in the world, from the robot to the goal."""
+    max_speed: float = math.inf
+    """No faster than this, whatever the robot's limits, m/s: stairs are climbed slowly."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))

@@ -88,6 +88,8 @@ class GoStair(ReplyModel):
 
     tool: Literal["go_stair"]
     stair: Literal["up", "down"]
+    # The view that shows them; missing: front.
+    direction: Literal["front", "left", "right", "back"] | None = None
 
 
 class DoubleCheck(ReplyModel):

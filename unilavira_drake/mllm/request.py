@@ -27,6 +27,10 @@ class ViewNote(Message):
     """Measured free distance along the view's axis, metres."""
 
 
+OTHER_FLOOR = "on another floor: "
+"""Begins what is told of a place that is not on the robot's floor."""
+
+
 @dataclass(frozen=True)
 class WaypointNote(Message):
     """A remembered place, told relative to where the robot is now (``front`` = 0 degrees)."""

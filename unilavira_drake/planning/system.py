@@ -10,6 +10,7 @@ from pydrake.systems.framework import Context
 
 from unilavira_drake.messages import (
     ALREADY_THERE,
+    STAIR_KINDS,
     Goal,
     Message,
     NavigationStatus,
@@ -19,6 +20,7 @@ from unilavira_drake.messages import (
 from unilavira_drake.planning.navigation_grid import path_is_blocked
 from unilavira_drake.planning.plan import Plan, PlanningParameters, make_plan, warm_up
 from unilavira_drake.planning.polyline import final_heading, remaining_length
+from unilavira_drake.planning.stairs import CLIMB_SPEED, Climb
 from unilavira_drake.ports import Level, message_input, pose_input
 
 PROGRESS = 0.05
@@ -32,6 +34,7 @@ FINAL_STRETCH = 0.75
 
 DETOUR = 2.0
 """A way that is so much longer than the one that is blocked is worth waiting for, metres."""
+CANNOT_CLIMB = "this robot cannot climb stairs"
 
 Point = tuple[float, float]
 
@@ -60,6 +63,8 @@ class PlannerState(Message):
     budget: float = 0.0
     blocked_since: float = math.inf
     """Since when there is no way any more, seconds; inf while there is one."""
+    climb: Climb | None = None
+    """Of a goal over stairs."""
 
 
 class FastMarchingPlanner(Level):
@@ -71,6 +76,9 @@ class FastMarchingPlanner(Level):
     correction was, unless the goal names a heading.  A terminal status and the empty path are
     views of one state.  Reasons of failure: the goal's own, ``unreachable``, ``no free space
     within ... m``, ``stuck``, ``travel budget``.
+
+    Over stairs (``climb``, ``descend``) the robot drives to their foot first, then straight and
+    slowly over them until the floor is level a storey higher or lower.
 
     .. pydrake_system::
 
@@ -90,6 +98,7 @@ class FastMarchingPlanner(Level):
         tolerance: arrived within this distance of the snapped goal, metres.
         stuck_time: stuck after this long without progress, seconds.
         travel_factor: fails after this many times the planned length plus 3 m.
+        can_climb: whether the robot can take stairs.
         replan_period: seconds between two plans while nothing blocks the way.
         patience: where the way is blocked on the drive, and there is none or a long one only, it
             waits so many seconds: for places where people walk.
@@ -105,6 +114,7 @@ class FastMarchingPlanner(Level):
         tolerance: float = 0.15,
         stuck_time: float = 6.0,
         travel_factor: float = 3.0,
+        can_climb: bool = False,
         replan_period: float = 1.0,
         patience: float = 0.0,
         period: float = 0.1,
@@ -114,6 +124,7 @@ class FastMarchingPlanner(Level):
         self._tolerance = tolerance
         self._stuck_time = stuck_time
         self._travel_factor = travel_factor
+        self._can_climb = can_climb
         self._replan_period = replan_period
         self._patience = patience
         self._map = message_input(self, "map", OccupancyMap())
@@ -127,7 +138,7 @@ class FastMarchingPlanner(Level):
         """Returns the state after a new goal, a new map or some way driven; see the class."""
         time = context.get_time()
         if not state.status.terminal:
-            return self._follow(state, self._map(context), self._position(context), time)
+            return self._go_on(context, state, time)
         goal = self._goal(context)
         if goal.n <= state.status.n:
             return state
@@ -136,9 +147,41 @@ class FastMarchingPlanner(Level):
             return state
         if goal.kind == "stay":
             return _done(goal.n, "arrived", "", goal.heading)
-        if goal.kind != "go" or goal.p_WG is None:
+        if goal.kind in STAIR_KINDS.values() and not self._can_climb:
+            return _done(goal.n, "failed", CANNOT_CLIMB, None)
+        if goal.kind not in ("go", *STAIR_KINDS.values()) or goal.p_WG is None:
             return _done(goal.n, "failed", goal.reason, None)
-        return self._begin(goal, occupancy, self._position(context), time)
+        state = self._begin(goal, occupancy, self._position(context), time)
+        return self._set_off(context, state, time)
+
+    def _go_on(self, context: Context, state: PlannerState, time: float) -> PlannerState:
+        position = self._position(context)
+        if state.climb is None or not state.climb.begun:
+            after = self._follow(state, self._map(context), position, time)
+            # The end of the way to the foot is forgotten with its goal.
+            after = after if state.climb is None else dc.replace(after, climb=state.climb)
+            return self._set_off(context, after, time)
+        z = float(self._pose(context).translation()[2])
+        climb = state.climb.at(position, z, time)
+        verdict, reason = climb.verdict(self._stuck_time, time)
+        if verdict == "moving":
+            return dc.replace(state, climb=climb) if climb != state.climb else state
+        return _done(state.status.n, verdict, reason, climb.heading)
+
+    def _set_off(self, context: Context, state: PlannerState, time: float) -> PlannerState:
+        """Begins the stairs of a robot that has come to their foot; others stay as they are."""
+        n, climb = state.status.n, state.climb
+        if climb is None or state.status.state != "arrived":
+            return state
+        position = self._position(context)
+        z = float(self._pose(context).translation()[2])
+        path = Path(n, state.path.version + 1, climb.path(position), CLIMB_SPEED)
+        return PlannerState(
+            status=NavigationStatus(n, "moving"),
+            path=path,
+            position=position,
+            climb=climb.set_off(position, z, time),
+        )
 
     def _position(self, context: Context) -> Point:
         x, y, _ = self._pose(context).translation()
@@ -148,10 +191,12 @@ class FastMarchingPlanner(Level):
         self, goal: Goal, occupancy: OccupancyMap, position: Point, time: float
     ) -> PlannerState:
         assert goal.p_WG is not None
+        climb = Climb.of(goal) if goal.kind in STAIR_KINDS.values() else None
+        target = goal.p_WG[:2] if climb is None else climb.approach(self._parameters.radius)
         fresh = PlannerState(
             status=NavigationStatus(goal.n, "moving"),
             heading=goal.heading,
-            target=goal.p_WG[:2],
+            target=target,
             viewpoint=position,
             progress_time=time,
             position=position,
@@ -163,7 +208,7 @@ class FastMarchingPlanner(Level):
             viewpoint=position,
             parameters=self._parameters,
         )
-        return self._planned(fresh, plan, occupancy, time)
+        return dc.replace(self._planned(fresh, plan, occupancy, time), climb=climb)
 
     def _planned(
         self, state: PlannerState, plan: Plan, occupancy: OccupancyMap, time: float

@@ -8,6 +8,7 @@ from pydrake.systems.framework import DiagramBuilder, System
 
 from unilavira_drake.robots.ground_actuation import add_ground_actuation, set_ground_start
 from unilavira_drake.robots.robot import GroundRobot, Robot
+from unilavira_drake.robots.terrain import GroundHeight
 
 
 def add_actuation(
@@ -16,6 +17,7 @@ def add_actuation(
     model_instance: ModelInstanceIndex,
     robot: Robot,
     locomotion: System | None = None,
+    ground_height: GroundHeight | None = None,
 ) -> None:
     """Adds what turns ``base_command`` into motion, and says where the robot is.
 
@@ -29,12 +31,13 @@ def add_actuation(
         robot: its type chooses the kind of actuation.
         locomotion: a System of the user's own in the place of ours, with its ports: a gait policy,
             a whole-body controller.
+        ground_height: of the world, for a robot that climbs.
 
     Raises:
         TypeError: if nothing is known to move such a robot.
     """
     if isinstance(robot, GroundRobot):
-        add_ground_actuation(builder, plant, model_instance, robot, locomotion)
+        add_ground_actuation(builder, plant, model_instance, robot, locomotion, ground_height)
     else:
         raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")
 
@@ -44,6 +47,7 @@ def set_start(
     model_instance: ModelInstanceIndex,
     robot: Robot,
     start: tuple[float, float, float],
+    height: float = 0.0,
 ) -> None:
     """Sets the default pose of a robot.
 
@@ -52,11 +56,12 @@ def set_start(
         model_instance: of the robot.
         robot: its type chooses what is set.
         start: x, y (metres) and yaw (radians).
+        height: of the floor at the start, metres.
 
     Raises:
         TypeError: as ``add_actuation``.
     """
     if isinstance(robot, GroundRobot):
-        set_ground_start(plant, model_instance, start)
+        set_ground_start(plant, model_instance, start, height)
     else:
         raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")

@@ -9,9 +9,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import DiagramBuilder, System
 
-from unilavira_drake.robots.planar_base import BASE_JOINTS, PlanarBase
+from unilavira_drake.robots.planar_base import BASE_JOINTS, HEIGHT_JOINT, PlanarBase
 from unilavira_drake.robots.planar_pose import PlanarPose
 from unilavira_drake.robots.robot import GroundRobot
+from unilavira_drake.robots.terrain import GroundHeight, TerrainFollower, set_start_height
 from unilavira_drake.robots.walking_base import WalkingBase
 
 
@@ -21,25 +22,39 @@ def add_ground_actuation(
     model_instance: ModelInstanceIndex,
     robot: GroundRobot,
     locomotion: System | None = None,
+    ground_height: GroundHeight | None = None,
 ) -> None:
     """Adds the base of a ground robot; see ``add_actuation``."""
     if robot.gait is None and locomotion is None:
         locomotion = PlanarBase(holonomic=robot.holonomic)
     joints = joint_names(plant, model_instance)
+    actuated = actuator_names(plant, model_instance)
     if locomotion is None:
         locomotion = WalkingBase(
             robot=robot,
-            joints=joints,
-            actuated=actuator_names(plant, model_instance),
+            joints=[name for name in joints if name != HEIGHT_JOINT],
+            actuated=[name for name in actuated if name != HEIGHT_JOINT],
             time_step=plant.time_step(),
         )
     builder.AddNamedSystem("locomotion", locomotion)
     state = plant.get_state_output_port(model_instance)
-    builder.Connect(state, locomotion.GetInputPort("joint_state"))
-    builder.Connect(
-        locomotion.GetOutputPort("desired_joint_state"),
-        plant.get_desired_state_input_port(model_instance),
-    )
+    desired = plant.get_desired_state_input_port(model_instance)
+    if HEIGHT_JOINT in joints and ground_height is not None:
+        terrain = builder.AddSystem(
+            TerrainFollower(joints=joints, actuated=actuated, ground_height=ground_height)
+        )
+        builder.Connect(state, terrain.GetInputPort("joint_state"))
+        builder.Connect(
+            terrain.GetOutputPort("level_joint_state"), locomotion.GetInputPort("joint_state")
+        )
+        builder.Connect(
+            locomotion.GetOutputPort("desired_joint_state"),
+            terrain.GetInputPort("desired_level_joint_state"),
+        )
+        builder.Connect(terrain.GetOutputPort("desired_joint_state"), desired)
+    else:
+        builder.Connect(state, locomotion.GetInputPort("joint_state"))
+        builder.Connect(locomotion.GetOutputPort("desired_joint_state"), desired)
     builder.ExportInput(locomotion.GetInputPort("base_command"), "base_command")
     pose = builder.AddSystem(PlanarPose(joints=joints))
     builder.Connect(state, pose.GetInputPort("joint_state"))
@@ -49,9 +64,16 @@ def add_ground_actuation(
 
 
 def set_ground_start(
-    plant: MultibodyPlant, model_instance: ModelInstanceIndex, start: tuple[float, float, float]
+    plant: MultibodyPlant,
+    model_instance: ModelInstanceIndex,
+    start: tuple[float, float, float],
+    height: float = 0.0,
 ) -> None:
-    """Sets the default x, y (metres) and yaw (radians) of a ground robot."""
+    """Sets the default x, y (metres) and yaw (radians) of a ground robot.
+
+    ``height`` is that of the floor, metres; a robot that does not climb stands at 0.
+    """
+    set_start_height(plant, model_instance, height)
     for name, value in zip(BASE_JOINTS, start, strict=True):
         joint = plant.GetJointByName(name, model_instance)
         position: Any = np.array([value])

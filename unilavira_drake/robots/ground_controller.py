@@ -68,6 +68,8 @@ class GroundTrackingController(LeafSystem):
             x, y, yaw = X_WB[0, 3], X_WB[1, 3], math.atan2(X_WB[1, 0], X_WB[0, 0])
             yaw_rate = self._twist(context)[2]
         if follow:
+            if path.max_speed < limits.max_speed:
+                limits = limits._replace(max_speed=path.max_speed)
             speed, rate = track_path(
                 path.p_WP, x, y, yaw, yaw_rate, speed, rate, self._reaction, limits
             )

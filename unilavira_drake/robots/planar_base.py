@@ -14,6 +14,9 @@ from unilavira_drake.ports import vector_input
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
 """Joints of a model that move its base in the plane, in their order."""
 
+HEIGHT_JOINT = "base_height"
+"""Joint that a robot has beside these when it climbs; it carries its body ``base``."""
+
 
 class PlanarBase(LeafSystem):
     """Translates between a body twist and the x, y, yaw joints of a planar base.
@@ -53,7 +56,7 @@ class PlanarBase(LeafSystem):
         output.SetFromVector([0.0, 0.0, 0.0, c * vx - s * vy, s * vx + c * vy, wz])
 
 
-def planar_pose(x: float, y: float, yaw: float) -> RigidTransform:
-    """Returns X_WB of a base on the floor."""
-    p_WB: Any = np.array([x, y, 0.0])
+def planar_pose(x: float, y: float, yaw: float, z: float = 0.0) -> RigidTransform:
+    """Returns X_WB of a base on a floor at height z."""
+    p_WB: Any = np.array([x, y, z])
     return RigidTransform(RotationMatrix.MakeZRotation(yaw), p_WB)

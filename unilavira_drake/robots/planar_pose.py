@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, LeafSystem
 
 from unilavira_drake.ports import vector_input
-from unilavira_drake.robots.planar_base import BASE_JOINTS, planar_pose
+from unilavira_drake.robots.planar_base import BASE_JOINTS, HEIGHT_JOINT, planar_pose
 
 
 class PlanarPose(LeafSystem):
@@ -27,7 +27,8 @@ class PlanarPose(LeafSystem):
         - twist
 
     ``joint_state`` is [q; v] of the model; ``X_WB`` is the true pose of the base frame B, level and
-    on the floor; ``twist`` is [w; v] of B in the world W, expressed in B (rad/s, m/s).
+    on the floor, or at the height of the joint ``base_height`` if there is one; ``twist`` is [w; v]
+    of B in the world W, expressed in B (rad/s, m/s).
 
     Args:
         joints: names of the model's joints in the order of the state; one coordinate each.
@@ -37,6 +38,7 @@ class PlanarPose(LeafSystem):
         super().__init__()
         self.set_name("planar_pose")
         self._base = [list(joints).index(name) for name in BASE_JOINTS]
+        self._height = list(joints).index(HEIGHT_JOINT) if HEIGHT_JOINT in joints else None
         self._count = len(joints)
         self._joint_state = vector_input(self, "joint_state", 2 * self._count)
         self.DeclareAbstractOutputPort("X_WB", Value[RigidTransform], self._calc_pose)
@@ -44,11 +46,14 @@ class PlanarPose(LeafSystem):
 
     def _calc_pose(self, context: Any, output: Any) -> None:
         state = self._joint_state(context).tolist()
-        output.set_value(planar_pose(*(state[index] for index in self._base)))
+        x, y, yaw = (state[index] for index in self._base)
+        z = 0.0 if self._height is None else state[self._height]
+        output.set_value(planar_pose(x, y, yaw, z))
 
     def _calc_twist(self, context: Any, output: Any) -> None:
         state = self._joint_state(context).tolist()
         yaw = state[self._base[2]]
         vx, vy, wz = (state[self._count + index] for index in self._base)
+        vz = 0.0 if self._height is None else state[self._count + self._height]
         c, s = math.cos(yaw), math.sin(yaw)
-        output.SetFromVector([0.0, 0.0, wz, c * vx + s * vy, c * vy - s * vx, 0.0])
+        output.SetFromVector([0.0, 0.0, wz, c * vx + s * vy, c * vy - s * vx, vz])

@@ -37,7 +37,7 @@ class VisionState(Message):
 
 
 class Vision(Level):
-    """Turns language action n (``turn``) and panorama n into vision action n.
+    """Turns language action n (``turn``, ``go_stair``) and panorama n into vision action n.
 
     No usable box or point is re-asked once; then the action selects nothing, which the goal
     selector turns into ``none`` and the ring into the outcome ``failed: no target``.
@@ -96,14 +96,14 @@ class Vision(Level):
 
     def _ask(self, context: Context, state: VisionState) -> VisionState:
         action = self._language_action(context)
-        if action.tool != "turn" or action.n == state.request.n:
+        if action.tool not in ("turn", "go_stair") or action.n == state.request.n:
             return state
         panorama = self._panorama(context)
         todo = self._todo_list.optional(context)
         if panorama.n != action.n or (todo is not None and todo.n != action.n):
             return state
         task = self._task(context)
-        direction = action.direction
+        direction = action.direction or "front"
         frame = panorama.frame(direction)
         request = MllmRequest(
             role="vision",
@@ -116,6 +116,7 @@ class Vision(Level):
                 direction=direction,
                 progress_analysis=action.progress_analysis,
                 reasoning_action=action.reasoning_action,
+                stair=action.stair if action.tool == "go_stair" else "",
                 todo=None if todo is None else todo.items,
                 width=frame.intrinsics.width,
                 height=frame.intrinsics.height,

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses as dc
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from unilavira_drake.errors import ScenarioError, unknown_name
+from unilavira_drake.worlds.entry_numbers import numbers, rgb
 from unilavira_drake.worlds.furniture import CATEGORIES, furniture_boxes
 from unilavira_drake.worlds.furniture_library import furniture_model
 from unilavira_drake.worlds.materials import FLOORS, WALLS
+from unilavira_drake.worlds.openings import check_apart, opening_of
 from unilavira_drake.worlds.outdoors import build as outdoors
 from unilavira_drake.worlds.outdoors.materials import GROUND
 from unilavira_drake.worlds.palette import PALETTE
@@ -19,13 +22,19 @@ from unilavira_drake.worlds.schema import (
     ObjectEntry,
     PanelEntry,
     RoomEntry,
+    StairsEntry,
     WorldFile,
 )
 from unilavira_drake.worlds.signs import MOST_LETTERS
-from unilavira_drake.worlds.structure import doorway, frame_boxes, walls
+from unilavira_drake.worlds.storeys import (
+    make_stairs,
+    stair_objects,
+    storey_elevations,
+    storey_walls,
+)
+from unilavira_drake.worlds.structure import frame_boxes
 from unilavira_drake.worlds.world import (
     Box,
-    Doorway,
     LabelEntry,
     Placement,
     Room,
@@ -35,9 +44,6 @@ from unilavira_drake.worlds.world import (
 
 WALL_GAP = 0.02
 """Between a wall and what stands at it, metres."""
-
-NARROWEST = 0.5
-"""Clear width of a doorway at least, metres."""
 
 WALL_SIDES = ("north", "east", "south", "west")
 
@@ -51,8 +57,10 @@ def build_world(entries: WorldFile, place: str) -> World:
     if not entries.outdoors:
         _check_indoors(entries, place)
     floors = GROUND if entries.outdoors else FLOORS
+    elevations = storey_elevations(entries, place)
     rooms = tuple(
-        _room(entry, floors, f"{place}: rooms: {entry.name!r}") for entry in entries.rooms
+        _room(entry, floors, elevations, f"{place}: rooms: {entry.name!r}")
+        for entry in entries.rooms
     )
     if not rooms:
         raise ScenarioError(f"{place}: rooms: empty; a world needs at least one room.")
@@ -62,34 +70,40 @@ def build_world(entries: WorldFile, place: str) -> World:
     ):
         if not low <= size <= high:
             raise ScenarioError(f"{place}: {key}: {size} is not usable; give {low} to {high} m.")
-    _unique((*entries.rooms, *entries.doors, *entries.objects, *entries.panels), place)
+    _unique(
+        (*entries.rooms, *entries.stairs, *entries.doors, *entries.objects, *entries.panels), place
+    )
     if entries.outdoors:
         return _outdoors(entries, rooms, place)
     by_name = {room.name: room for room in rooms}
     _check_materials(rooms, place)
     things = _things(entries.objects, by_name, entries.wall_thickness, place)
     panels = tuple(_panel(entry, by_name, entries, place) for entry in entries.panels)
-    openings = tuple(_opening(entry, by_name, entries, place) for entry in entries.doors)
-    _check_apart(entries.doors, openings, place)
+    openings = tuple(opening_of(entry, by_name, entries, place) for entry in entries.doors)
+    check_apart(entries.doors, openings, place)
+    stairs = tuple(make_stairs(entry, by_name, entries, place) for entry in entries.stairs)
     doors = tuple(
         WorldObject(
             name=entry.name,
             category="door",
             color=entry.color,
             room="|".join(entry.rooms),
-            boxes=frame_boxes(opening),
+            boxes=tuple(box.lowered(-opening.elevation) for box in frame_boxes(opening)),
         )
         for entry, opening in zip(entries.doors, openings, strict=True)
         if not opening.open
     )
+    built = stair_objects(entries.stairs, stairs, by_name, entries.wall_thickness)
+    objects = (*things, *panels, *doors, *built)
     return World(
         name=entries.name,
         rooms=rooms,
-        objects=(*things, *panels, *doors),
-        walls=walls(rooms, openings, entries.wall_height, entries.wall_thickness),
-        labels=_labels((*things, *panels, *doors), rooms),
+        objects=objects,
+        walls=storey_walls(rooms, openings, entries.wall_height, entries.wall_thickness),
+        stairs=stairs,
+        labels=_labels(objects, rooms),
         wall_height=entries.wall_height,
-        wall_color=_rgb(entries.wall_color, f"{place}: wall_color"),
+        wall_color=rgb(entries.wall_color, f"{place}: wall_color"),
         wall_thickness=entries.wall_thickness,
         doorways=openings,
     )
@@ -134,8 +148,10 @@ def _labels(things: tuple[WorldObject, ...], rooms: tuple[Room, ...]) -> dict[in
     return dict(enumerate(entries, start=1))
 
 
-def _room(entry: RoomEntry, floors: Mapping[str, object], place: str) -> Room:
-    x_min, y_min, x_max, y_max = _numbers(entry.rectangle, 4, f"{place}: rectangle")
+def _room(
+    entry: RoomEntry, floors: Mapping[str, object], elevations: Mapping[str, float], place: str
+) -> Room:
+    x_min, y_min, x_max, y_max = numbers(entry.rectangle, 4, f"{place}: rectangle")
     if x_min >= x_max or y_min >= y_max:
         raise ScenarioError(
             f"{place}: rectangle: {entry.rectangle} is empty; give x_min, y_min, x_max, y_max."
@@ -143,13 +159,18 @@ def _room(entry: RoomEntry, floors: Mapping[str, object], place: str) -> Room:
     for key, value, valid in (("floor", entry.floor, floors), ("walls", entry.walls, WALLS)):
         if value and value not in valid:
             raise ScenarioError(unknown_name("material", value, valid, f"{place}: {key}"))
+    if entry.storey not in elevations:
+        raise ScenarioError(
+            unknown_name("storey", entry.storey, filter(None, elevations), f"{place}: storey")
+        )
     return Room(
+        elevation=elevations[entry.storey],
         floor=entry.floor,
         walls=entry.walls,
         name=entry.name,
         kind=entry.kind or entry.name,
         rectangle=(x_min, y_min, x_max, y_max),
-        floor_color=_rgb(entry.floor_color, f"{place}: floor_color"),
+        floor_color=rgb(entry.floor_color, f"{place}: floor_color"),
     )
 
 
@@ -179,7 +200,8 @@ def _things(
             raise ScenarioError(f"{here}: height: {entry.height} is under the floor.")
         if entry.wall and not entry.model:
             raise ScenarioError(f"{here}: wall: needs a model; give a position of two numbers.")
-        height = _top(entry.stands_on, things, here) if entry.stands_on else entry.height
+        floor = rooms[entry.room].elevation
+        height = _top(entry.stands_on, things, here) if entry.stands_on else floor + entry.height
         if entry.model:
             thing = _modelled(entry, height, rooms[entry.room], thickness, here)
         else:
@@ -211,7 +233,7 @@ def _boxed(entry: ObjectEntry, height: float, place: str) -> WorldObject:
     ):
         if value not in valid:
             raise ScenarioError(unknown_name(key, value, valid, place))
-    x, y = _numbers(entry.position, 2, f"{place}: position")
+    x, y = numbers(entry.position, 2, f"{place}: position")
     boxes = furniture_boxes(entry.category, x, y, math.radians(entry.yaw_degrees), height)
     return WorldObject(entry.name, entry.category, entry.color, entry.room, boxes)
 
@@ -223,7 +245,7 @@ def _modelled(
     if entry.wall:
         x, y, yaw = _at_wall(entry, model.size, room, thickness / 2 + WALL_GAP, place)
     else:
-        x, y = _numbers(entry.position, 2, f"{place}: position")
+        x, y = numbers(entry.position, 2, f"{place}: position")
         yaw = math.radians(entry.yaw_degrees)
     return WorldObject(
         name=entry.name,
@@ -252,7 +274,7 @@ def _at_wall(
     """Returns x, y and yaw of a model with its back, or at a turn its side, to a wall."""
     if entry.wall not in WALL_SIDES:
         raise ScenarioError(unknown_name("wall", entry.wall, WALL_SIDES, place))
-    (along,) = _numbers(entry.position, 1, f"{place}: position")
+    (along,) = numbers(entry.position, 1, f"{place}: position")
     turn = math.radians(entry.yaw_degrees)
     depth = abs(math.cos(turn)) * size[0] + abs(math.sin(turn)) * size[1]
     x_min, y_min, x_max, y_max = room.rectangle
@@ -284,8 +306,8 @@ def _panel(
     ):
         if value not in valid:
             raise ScenarioError(unknown_name(key, value, valid, place))
-    x, y = _numbers(entry.position, 2, f"{place}: position")
-    width, height = _numbers(entry.size, 2, f"{place}: size")
+    x, y = numbers(entry.position, 2, f"{place}: position")
+    width, height = numbers(entry.size, 2, f"{place}: size")
     if min(width, height) < 0.05:
         raise ScenarioError(f"{place}: size: {entry.size}; give width and height above 0.05 m.")
     if not 0.0 <= entry.height <= entries.wall_height - height * (entry.category != "rug"):
@@ -299,6 +321,8 @@ def _panel(
         )
     room = rooms[entry.room]
     visual = panel(entry, room, (x, y), (width, height), entries.wall_thickness)
+    if room.elevation:
+        visual = dc.replace(visual, box=visual.box.lowered(-room.elevation))
     thing = WorldObject(
         name=entry.name,
         category=entry.category,
@@ -312,41 +336,11 @@ def _panel(
     return thing
 
 
-def _opening(entry: DoorEntry, rooms: dict[str, Room], entries: WorldFile, place: str) -> Doorway:
-    place = f"{place}: doors: {entry.name!r}"
-    if entry.color not in PALETTE:
-        raise ScenarioError(unknown_name("color", entry.color, PALETTE, place))
-    if len(entry.rooms) != 2:
-        raise ScenarioError(f"{place}: rooms: {entry.rooms}; name the two rooms it joins.")
-    for name in entry.rooms:
-        if name not in rooms:
-            raise ScenarioError(unknown_name("room", name, rooms, place))
-    x, y = _numbers(entry.position, 2, f"{place}: position")
-    if not entry.width >= NARROWEST:
-        raise ScenarioError(f"{place}: width: {entry.width}; give at least {NARROWEST} m.")
-    joined = (rooms[entry.rooms[0]], rooms[entry.rooms[1]])
-    opening = doorway(Doorway(x, y, entry.width, open=entry.open), joined, entries.wall_thickness)
-    if opening is None:
-        raise ScenarioError(
-            f"{place}: position: {entry.position} with width {entry.width} is not on a wall "
-            f"shared by {' and '.join(entry.rooms)}; put it on their common edge."
-        )
-    return opening
-
-
-def _check_apart(doors: list[DoorEntry], openings: tuple[Doorway, ...], place: str) -> None:
-    for i, a in enumerate(openings):
-        for k, b in enumerate(openings[:i]):
-            along, across = (b.x - a.x, b.y - a.y) if a.along_x else (b.y - a.y, b.x - a.x)
-            same = a.along_x == b.along_x and abs(across) < 1e-6
-            if same and abs(along) < a.gap + b.gap:
-                raise ScenarioError(
-                    f"{place}: doors: {doors[k].name!r} and {doors[i].name!r} overlap; move one."
-                )
-
-
 def _unique(
-    entries: Iterable[RoomEntry | DoorEntry | ObjectEntry | PanelEntry | outdoors.Named], place: str
+    entries: Iterable[
+        RoomEntry | StairsEntry | DoorEntry | ObjectEntry | PanelEntry | outdoors.Named
+    ],
+    place: str,
 ) -> None:
     seen: set[str] = set()
     for entry in entries:
@@ -354,16 +348,3 @@ def _unique(
             problem = f"the name {entry.name!r} is used twice" if entry.name else "a name is empty"
             raise ScenarioError(f"{place}: {problem}; every name must be unique.")
         seen.add(entry.name)
-
-
-def _numbers(values: list[float], count: int, place: str) -> tuple[float, ...]:
-    if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise ScenarioError(f"{place}: {values}; expected {count} numbers.")
-    return tuple(values)
-
-
-def _rgb(values: list[float], place: str) -> tuple[float, float, float]:
-    red, green, blue = _numbers(values, 3, place)
-    if not all(0.0 <= value <= 1.0 for value in values):
-        raise ScenarioError(f"{place}: {values}; each of red, green, blue must lie in [0, 1].")
-    return (red, green, blue)

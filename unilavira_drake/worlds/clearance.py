@@ -8,17 +8,26 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from unilavira_drake.worlds.stairwell import opening_boxes
 from unilavira_drake.worlds.world import Box, Room, World
 
 ROBOT_HEIGHTS = (0.03, 1.5)
 """Boxes wholly outside these heights (a lintel) stop no robot on the floor, metres."""
 
 
-def obstacles(world: World) -> tuple[tuple[str, Box], ...]:
-    """Returns the boxes that stop a robot on the floor, each with the name of its thing."""
+def obstacles(world: World, elevation: float = 0.0) -> tuple[tuple[str, Box], ...]:
+    """Returns the boxes that stop a robot on the floor, each with the name of its thing.
+
+    Args:
+        world: its walls and things; openings in an upper floor stop a robot, too.
+        elevation: height of the floor of one of its storeys, metres.
+    """
     named = [("wall", box) for box in world.walls]
     named += [(thing.name, box) for thing in world.objects if thing.solid for box in thing.boxes]
-    low, high = ROBOT_HEIGHTS
+    for stairs in world.stairs:
+        if stairs.top == elevation:
+            named += [(stairs.name, box) for box in opening_boxes(stairs)]
+    low, high = (elevation + height for height in ROBOT_HEIGHTS)
     return tuple(
         (name, box)
         for name, box in named
@@ -26,24 +35,27 @@ def obstacles(world: World) -> tuple[tuple[str, Box], ...]:
     )
 
 
-def clearance(world: World, p_WP: NDArray[np.float64]) -> NDArray[np.float64]:
+def clearance(
+    world: World, p_WP: NDArray[np.float64], elevation: float = 0.0
+) -> NDArray[np.float64]:
     """Returns the distance from floor points to the nearest obstacle; 0 inside one.
 
     Args:
         world: its walls and things.
         p_WP: (k, 2) float64, metres in the world.
+        elevation: height of the floor, metres.
 
     Returns:
         (k,) float64, metres.
     """
-    return _distances(p_WP, (box for _, box in obstacles(world)))
+    return _distances(p_WP, (box for _, box in obstacles(world, elevation)))
 
 
-def nearest_obstacle(world: World, x: float, y: float) -> tuple[str, float]:
+def nearest_obstacle(world: World, x: float, y: float, elevation: float = 0.0) -> tuple[str, float]:
     """Returns the name of the thing nearest to a floor point and its distance, metres."""
     point = np.array([[x, y]])
     return min(
-        ((name, float(_distances(point, (box,))[0])) for name, box in obstacles(world)),
+        ((name, float(_distances(point, (box,))[0])) for name, box in obstacles(world, elevation)),
         key=lambda found: found[1],
         default=("nothing", math.inf),
     )

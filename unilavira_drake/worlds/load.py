@@ -15,11 +15,22 @@ from unilavira_drake.resources import models_path
 from unilavira_drake.worlds.build import build_world
 from unilavira_drake.worlds.outdoors.entries import BuildingEntry, GroundEntry, RowEntry
 from unilavira_drake.worlds.outdoors.things import Building, Exterior, Place
-from unilavira_drake.worlds.schema import DoorEntry, ObjectEntry, PanelEntry, RoomEntry, WorldFile
+from unilavira_drake.worlds.schema import (
+    DoorEntry,
+    ObjectEntry,
+    PanelEntry,
+    RoomEntry,
+    StairsEntry,
+    StoreyEntry,
+    WorldFile,
+)
+from unilavira_drake.worlds.stairs import Stairs
 from unilavira_drake.worlds.world import Box, Panel, Placement, World, WorldObject
 
 _LISTS = {
+    "storeys": StoreyEntry,
     "rooms": RoomEntry,
+    "stairs": StairsEntry,
     "doors": DoorEntry,
     "objects": ObjectEntry,
     "panels": PanelEntry,
@@ -126,12 +137,18 @@ def _mirrored(world: World) -> World:
         objects=tuple(_flipped_object(thing) for thing in world.objects),
         walls=tuple(map(_flipped_box, world.walls)),
         doorways=tuple(dc.replace(opening, y=-opening.y) for opening in world.doorways),
+        stairs=tuple(map(_flipped_stairs, world.stairs)),
         mirrored=True,
         ground=tuple(
             dc.replace(patch, rectangle=_flipped_rectangle(patch.rectangle))
             for patch in world.ground
         ),
     )
+
+
+def _flipped_stairs(stairs: Stairs) -> Stairs:
+    x_min, y_min, x_max, y_max = stairs.rectangle
+    return dc.replace(stairs, rectangle=(x_min, -y_max, x_max, -y_min), heading=-stairs.heading)
 
 
 def _flipped_object(thing: WorldObject) -> WorldObject:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydrake.common import MemoryFile
 from pydrake.geometry import Box as BoxShape
 from pydrake.geometry import (
+    GeometryId,
     GeometryInstance,
     IllustrationProperties,
     InMemoryMesh,
@@ -36,7 +37,24 @@ from unilavira_drake.worlds.outdoors.meshes import ground_meshes, solid_ground, 
 from unilavira_drake.worlds.outdoors.things import Building, Exterior
 from unilavira_drake.worlds.palette import PALETTE
 from unilavira_drake.worlds.panels import panel_quads
-from unilavira_drake.worlds.world import Box, Panel, Placement, Room, World, WorldObject
+from unilavira_drake.worlds.stairs import Rectangle
+from unilavira_drake.worlds.stairwell import (
+    ceiling_holes,
+    edge_boxes,
+    floor_holes,
+    pieces,
+    slabs,
+    stair_quads,
+)
+from unilavira_drake.worlds.world import (
+    Box,
+    Doorway,
+    Panel,
+    Placement,
+    Room,
+    World,
+    WorldObject,
+)
 
 Color = tuple[float, float, float]
 
@@ -94,28 +112,40 @@ class _Shape:
     """To people, too; a ceiling is not, it would hide the rooms from above."""
 
 
-def add_scenery(plant: MultibodyPlant, scene_graph: SceneGraph, world: World) -> None:
+def add_scenery(
+    plant: MultibodyPlant, scene_graph: SceneGraph, world: World
+) -> tuple[GeometryId, ...]:
     """Adds a world's collision boxes and labelled meshes to the world body.
 
-    Call it before ``plant.Finalize()``.  The floor of rooms has no collision geometry: the bases
-    move in the plane.  The ground outdoors has, for what flies.
+    Call it before ``plant.Finalize()``.  The lowest floor of rooms has no collision geometry: the
+    bases move in the plane.  The ground outdoors has, for what flies.
+
+    Returns:
+        The collision geometry of the ground on which a climbing robot walks: steps, and the slabs
+        under upper floors.  Its height follows the world's ``ground_height`` without contact.
     """
     friction = CoulombFriction(0.5, 0.5)
     boxes = [("wall", box) for box in world.walls]
     boxes += [(thing.name, box) for thing in world.objects if thing.solid for box in thing.boxes]
     if world.outdoors:
         boxes.append(("ground", solid_ground(world)))
+    boxes += [("slab", box) for box in slabs(world.rooms, world.stairs, world.wall_height)]
+    steps = {flight.name for flight in world.stairs}
+    ground = []
     for index, (name, box) in enumerate(boxes):
         p_WB: Any = box.center
-        plant.RegisterCollisionGeometry(
+        geometry = plant.RegisterCollisionGeometry(
             plant.world_body(),
             RigidTransform(RollPitchYaw(0, 0, box.yaw), p_WB),
             BoxShape(*box.size),
             f"{name}_{index}",
             friction,
         )
+        if name == "slab" or name in steps:
+            ground.append(geometry)
     for shape in _shapes(world):
         _register(plant, scene_graph, shape)
+    return tuple(ground)
 
 
 def scenery_triangles(world: World) -> int:
@@ -132,8 +162,10 @@ def scenery_triangles(world: World) -> int:
     if world.outdoors:
         return count + sum(part.triangles for _, part in ground_meshes(world))
     for room in world.rooms:
-        walls = shell.walls(room, world.doorways, (), world.wall_height, world.wall_thickness)
-        count += 2 * (2 + sum(len(part.corners) for part in walls))
+        doorways = _doorways(world, room)
+        walls = shell.walls(room, doorways, (), world.wall_height, world.wall_thickness)
+        holes = len(floor_holes(room, world.stairs)) + len(ceiling_holes(room, world.stairs))
+        count += 2 * (2 + 3 * holes + sum(len(part.corners) for part in walls))
     return count
 
 
@@ -141,7 +173,12 @@ def _shapes(world: World) -> Iterable[_Shape]:
     for thing in world.objects:
         label = world.label_of(thing.name)
         assert label is not None
-        yield _thing(thing, label, textured=world.textured)
+        flight = next((one for one in world.stairs if one.name == thing.name), None)
+        if flight is not None and world.textured:
+            mesh = textured_mesh(thing.name, stair_quads(flight))
+            yield _Shape(thing.name, label, mesh, RigidTransform())
+        else:
+            yield _thing(thing, label, textured=world.textured)
     if world.outdoors:
         yield from _ground(world)
         return
@@ -153,12 +190,16 @@ def _shapes(world: World) -> Iterable[_Shape]:
         yield from (
             _textured_room(world, room, label, wall)
             if world.textured
-            else (_flat(f"{room.name}_floor", label, room.floor_color, *_rectangles((room,), 0.0)),)
+            else (_flat(f"{room.name}_floor", label, room.floor_color, *_floors(world, room)),)
         )
+    edges = [box for one in world.stairs for box in edge_boxes(one, world.wall_height)]
     if not world.textured:
-        yield _flat("walls", wall, world.wall_color, *_box_quads(world.walls))
-        quads, normals = _rectangles(world.rooms, world.wall_height)
+        yield _flat("walls", wall, world.wall_color, *_box_quads((*world.walls, *edges)))
+        quads, normals = _ceilings(world)
         yield _flat("ceiling", wall, world.wall_color, quads[:, ::-1], -normals, shown=False)
+    elif edges:
+        edge = WorldObject("slab_edges", color="white", boxes=tuple(edges))
+        yield _thing(edge, wall, textured=True)
 
 
 def _thing(thing: WorldObject, label: int, *, textured: bool) -> _Shape:
@@ -190,18 +231,29 @@ def _ground(world: World) -> Iterable[_Shape]:
 
 def _textured_room(world: World, room: Room, floor: int, wall: int) -> Iterable[_Shape]:
     boxes = [
-        box
+        box.lowered(room.elevation)
         for thing in world.objects
         for box in thing.boxes
-        if thing.visual and room.contains(box.center[0], box.center[1])
+        if thing.visual
+        and room.contains(box.center[0], box.center[1])
+        and world.stands_on(box, room.elevation)
     ]
-    quads = shell.walls(room, world.doorways, boxes, world.wall_height, world.wall_thickness)
+    quads = shell.walls(
+        room, _doorways(world, room), boxes, world.wall_height, world.wall_thickness
+    )
+    floors = [shell.floor(room, boxes, floor_holes(room, world.stairs))]
+    ceilings = [shell.ceiling(room, world.wall_height, ceiling_holes(room, world.stairs))]
+    X_WM = RigidTransform(np.array([0.0, 0.0, room.elevation]))  # type: ignore[arg-type]
     for name, label, parts, shown in (
-        (f"{room.name}_floor", floor, [shell.floor(room, boxes)], True),
+        (f"{room.name}_floor", floor, floors, True),
         (f"{room.name}_walls", wall, quads, True),
-        (f"{room.name}_ceiling", wall, [shell.ceiling(room, world.wall_height)], False),
+        (f"{room.name}_ceiling", wall, ceilings, False),
     ):
-        yield _Shape(name, label, textured_mesh(name, parts), RigidTransform(), shown=shown)
+        yield _Shape(name, label, textured_mesh(name, parts), X_WM, shown=shown)
+
+
+def _doorways(world: World, room: Room) -> tuple[Doorway, ...]:
+    return tuple(door for door in world.doorways if door.elevation == room.elevation)
 
 
 def _flat(
@@ -228,12 +280,28 @@ def _box_quads(boxes: Sequence[Box]) -> tuple[NDArray[np.float64], NDArray[np.fl
     return np.concatenate(quads), np.concatenate(normals)
 
 
-def _rectangles(rooms: Sequence[Room], z: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _floors(world: World, room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    parts = pieces(room.rectangle, floor_holes(room, world.stairs))
+    return _rectangles([(part, room.elevation) for part in parts])
+
+
+def _ceilings(world: World) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return _rectangles(
+        [
+            (part, room.elevation + world.wall_height)
+            for room in world.rooms
+            for part in pieces(room.rectangle, ceiling_holes(room, world.stairs))
+        ]
+    )
+
+
+def _rectangles(
+    parts: Sequence[tuple[Rectangle, float]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     quads = []
-    for room in rooms:
-        x_min, y_min, x_max, y_max = room.rectangle
+    for (x_min, y_min, x_max, y_max), z in parts:
         quads.append([(x_min, y_min, z), (x_max, y_min, z), (x_max, y_max, z), (x_min, y_max, z)])
-    return np.array(quads, dtype=float), np.tile([0.0, 0.0, 1.0], (len(rooms), 1))
+    return np.array(quads, dtype=float), np.tile([0.0, 0.0, 1.0], (len(parts), 1))
 
 
 def _register(plant: MultibodyPlant, scene_graph: SceneGraph, shape: _Shape) -> None:

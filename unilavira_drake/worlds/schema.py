@@ -18,6 +18,39 @@ class RoomEntry:
     # Materials, see worlds/materials.py: all rooms of a world have both, or none has.
     floor: str = ""
     walls: str = ""
+    # Name of its storey; empty: the one at height 0.
+    storey: str = ""
+
+
+@dc.dataclass
+class StoreyEntry:
+    """A storey above or below the one at height 0."""
+
+    name: str = ""
+    # Height of its floor, metres.
+    elevation: float = 0.0
+
+
+@dc.dataclass
+class StairsEntry:
+    """A straight flight of stairs, with or without a level landing halfway."""
+
+    name: str = ""
+    # The room where it begins and the room above to which it leads.
+    rooms: list[str] = dc.field(default_factory=list)
+    # x_min, y_min, x_max, y_max of the flight, metres; the floor above is open there.
+    rectangle: list[float] = dc.field(default_factory=list)
+    # north, east, south or west: where the way up leads.
+    direction: str = ""
+    # Risers; the last tread is level with the floor above.
+    steps: int = 15
+    # Length of a landing halfway, metres; 0: none.
+    landing: float = 0.0
+    # Material of the treads, see worlds/materials.py.
+    material: str = "oak"
+    # Colour words of the risers and of the railings.
+    color: str = "white"
+    railing_color: str = "brown"
 
 
 @dc.dataclass
@@ -90,7 +123,9 @@ class WorldFile:
     wall_thickness: float = 0.1
     # Red, green, blue in [0, 1].
     wall_color: list[float] = dc.field(default_factory=lambda: [0.9, 0.9, 0.9])
+    storeys: list[StoreyEntry] = dc.field(default_factory=list)
     rooms: list[RoomEntry] = dc.field(default_factory=list)
+    stairs: list[StairsEntry] = dc.field(default_factory=list)
     doors: list[DoorEntry] = dc.field(default_factory=list)
     objects: list[ObjectEntry] = dc.field(default_factory=list)
     panels: list[PanelEntry] = dc.field(default_factory=list)

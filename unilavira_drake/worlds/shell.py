@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from unilavira_drake.worlds.gltf import TexturedQuads
 from unilavira_drake.worlds.materials import FLOORS, WALLS, Image, Material, texture
 from unilavira_drake.worlds.shadows import edge_shade, floor_shade, wall_shade
+from unilavira_drake.worlds.stairs import Rectangle
+from unilavira_drake.worlds.stairwell import pieces
 from unilavira_drake.worlds.structure import DOOR_HEIGHT
 from unilavira_drake.worlds.world import JAMB_WIDTH, Box, Doorway, Room
 
@@ -40,8 +42,8 @@ class _Side:
         return float(np.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1]))
 
 
-def floor(room: Room, boxes: Sequence[Box]) -> TexturedQuads:
-    """Returns the floor of a room whose material is named, shaded around things."""
+def floor(room: Room, boxes: Sequence[Box], holes: Sequence[Rectangle] = ()) -> TexturedQuads:
+    """Returns the floor of a room whose material is named, shaded around things, but for holes."""
     x_min, y_min, x_max, y_max = room.rectangle
     detail = _detail(FLOOR_DETAIL, x_max - x_min, y_max - y_min)
     image = texture(
@@ -54,13 +56,12 @@ def floor(room: Room, boxes: Sequence[Box]) -> TexturedQuads:
     rows, columns = image.shape[:2]
     shade = edge_shade(rows, columns, detail, depth=0.30)
     shade = shade * floor_shade(boxes, room.rectangle, rows, columns, detail)
-    corners = [[(x_min, y_min, 0), (x_max, y_min, 0), (x_max, y_max, 0), (x_min, y_max, 0)]]
-    uv = [[(0, 1), (1, 1), (1, 0), (0, 0)]]
-    return TexturedQuads(np.array(corners, float), np.array(uv, float), _bytes(image, shade))
+    corners, uv = _level(room.rectangle, holes, 0.0)
+    return TexturedQuads(corners, uv, _bytes(image, shade))
 
 
-def ceiling(room: Room, height: float) -> TexturedQuads:
-    """Returns the ceiling of a room, brighter in the middle."""
+def ceiling(room: Room, height: float, holes: Sequence[Rectangle] = ()) -> TexturedQuads:
+    """Returns the ceiling of a room, brighter in the middle, but for holes."""
     x_min, y_min, x_max, y_max = room.rectangle
     detail = _detail(16.0, x_max - x_min, y_max - y_min)
     material = Material("paint", CEILING_COLOR)
@@ -73,10 +74,24 @@ def ceiling(room: Room, height: float) -> TexturedQuads:
     )
     rows, columns = image.shape[:2]
     shade = edge_shade(rows, columns, detail, depth=0.18)
-    corners = [[(x_min, y_max), (x_max, y_max), (x_max, y_min), (x_min, y_min)]]
-    quads = np.concatenate((np.array(corners, float), np.full((1, 4, 1), height)), axis=2)
-    uv = [[(0, 0), (1, 0), (1, 1), (0, 1)]]
-    return TexturedQuads(quads, np.array(uv, float), _bytes(image, shade))
+    corners, uv = _level(room.rectangle, holes, height)
+    turned = [3, 2, 1, 0]  # seen from below
+    return TexturedQuads(corners[:, turned], uv[:, turned], _bytes(image, shade))
+
+
+def _level(
+    rectangle: Rectangle, holes: Sequence[Rectangle], z: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns corners, counter-clockwise from above, and uv of a rectangle but for holes."""
+    x_min, y_min, x_max, y_max = rectangle
+    corners, uv = [], []
+    for a, b, c, d in pieces(rectangle, holes):
+        points = ((a, b), (c, b), (c, d), (a, d))
+        corners.append([(x, y, z) for x, y in points])
+        uv.append(
+            [((x - x_min) / (x_max - x_min), (y_max - y) / (y_max - y_min)) for x, y in points]
+        )
+    return np.array(corners, float), np.array(uv, float)
 
 
 def walls(

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses as dc
 import math
 from dataclasses import dataclass, field
 
 from unilavira_drake.messages import Message
 from unilavira_drake.worlds.outdoors.things import Building, Exterior, GroundPatch
+from unilavira_drake.worlds.stairs import Stairs
 
 JAMB_WIDTH = 0.09
 """Metres; jambs stand outside the clear width of a doorway."""
+
+BELOW_FLOOR = 0.5
+"""Who is no farther below a floor than this, on the last steps, is on its storey, metres."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +27,11 @@ class Box(Message):
     """Edge lengths, metres."""
     yaw: float = 0.0
     """Radians."""
+
+    def lowered(self, elevation: float) -> Box:
+        """Returns the box as seen from a floor at a height, metres."""
+        x, y, z = self.center
+        return self if elevation == 0.0 else dc.replace(self, center=(x, y, z - elevation))
 
     def corners(self) -> tuple[tuple[float, float], ...]:
         """Returns the four corners of the footprint, counter-clockwise, metres."""
@@ -49,6 +59,8 @@ class Doorway(Message):
     """Whether the wall runs along x."""
     open: bool = False
     """Whether the wall is missing up to the ceiling; else there is a frame and a lintel."""
+    elevation: float = 0.0
+    """Height of the floor, metres."""
 
     @property
     def gap(self) -> float:
@@ -99,6 +111,8 @@ class Room(Message):
     """Material of the floor; empty where the world is flat-shaded."""
     walls: str = ""
     """Material of the walls."""
+    elevation: float = 0.0
+    """Height of the floor, metres."""
 
     def contains(self, x: float, y: float) -> bool:
         """Whether a point of the floor lies in this room."""
@@ -148,6 +162,7 @@ class World(Message):
     objects: tuple[WorldObject, ...] = ()
     walls: tuple[Box, ...] = ()
     doorways: tuple[Doorway, ...] = ()
+    stairs: tuple[Stairs, ...] = ()
     labels: dict[int, LabelEntry] = field(default_factory=dict)
     """Render label -> meaning; every labelled geometry has an entry."""
     wall_height: float = 2.6
@@ -176,9 +191,65 @@ class World(Message):
         x_max, y_max = (max(rectangle[i] for rectangle in rectangles) for i in (2, 3))
         return x_min, y_min, x_max, y_max
 
-    def room_at(self, x: float, y: float) -> Room | None:
-        """Returns the room that holds a point of the floor, or None outside."""
-        return next((room for room in self.rooms if room.contains(x, y)), None)
+    @property
+    def elevations(self) -> tuple[float, ...]:
+        """Heights of the floors of all storeys, from the lowest up, metres."""
+        return tuple(sorted({room.elevation for room in self.rooms}))
+
+    def storey_at(self, z: float) -> float:
+        """Returns the height of the floor of the storey on which something at a height is."""
+        below = [height for height in self.elevations if height <= z + BELOW_FLOOR]
+        return below[-1] if below else self.elevations[0]
+
+    def room_at(self, x: float, y: float, z: float = 0.0) -> Room | None:
+        """Returns the room that holds a point of the floor at a height, or None outside."""
+        if not self.rooms:
+            return None
+        floor = self.storey_at(z)
+        rooms = (room for room in self.rooms if room.elevation == floor)
+        return next((room for room in rooms if room.contains(x, y)), None)
+
+    def storey(self, z: float) -> World:
+        """Returns the storey at a height alone, with its floor at height 0; labels stay."""
+        floor = self.storey_at(z)
+        if len(self.elevations) == 1:
+            return self
+        rooms = tuple(dc.replace(r, elevation=0.0) for r in self.rooms if r.elevation == floor)
+        things = tuple(
+            dc.replace(thing, boxes=tuple(box.lowered(floor) for box in thing.boxes))
+            for thing in self.objects
+            if any(self.stands_on(box, floor) for box in thing.boxes)
+        )
+        walls = (box.lowered(floor) for box in self.walls if self.stands_on(box, floor))
+        doors = (door for door in self.doorways if door.elevation == floor)
+        return dc.replace(
+            self,
+            rooms=rooms,
+            objects=things,
+            walls=tuple(walls),
+            doorways=tuple(dc.replace(door, elevation=0.0) for door in doors),
+            stairs=(),
+        )
+
+    def stands_on(self, box: Box, floor: float) -> bool:
+        """Whether a box begins between a storey's floor and the next one."""
+        bottom = box.center[2] - box.size[2] / 2
+        below = [height for height in self.elevations if height <= bottom + 1e-6]
+        return (below[-1] if below else self.elevations[0]) == floor
+
+    def ground_height(self, x: float, y: float, z: float = 0.0) -> float:
+        """Returns the height at which a robot stands there: on a floor, or on stairs.
+
+        Args:
+            x: metres.
+            y: metres.
+            z: about the height where it is; the nearest ground to it counts.
+        """
+        flights = [flight for flight in self.stairs if flight.contains(x, y)]
+        ground = [flight.height(x, y) for flight in flights]
+        taken = {height for flight in flights for height in (flight.bottom, flight.top)}
+        ground += [height for height in self.elevations if height not in taken]
+        return min(ground, key=lambda height: (abs(height - z), height))
 
     def room(self, name: str) -> Room | None:
         """Returns the room with this name or kind, or None."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-HARD = ("leave", "enter", "through", "along", "door", "go", "stop")
+HARD = ("leave", "enter", "through", "along", "door", "climb", "go", "stop")
 """Clauses that say where to be.  The others (turn, straight, pass, end, near_door, see) say how to
 get there and become moot once a later hard clause is met."""
 
@@ -18,14 +18,14 @@ class Clause:
 
     kind: str
     """``leave | enter | through | along | end | door | near_door | turn | straight | pass | see |
-    go | stop``."""
+    climb | go | stop``."""
     category: str = ""
     """Class of the thing meant (``go``, ``stop``, ``pass``, ``see``)."""
     color: str = ""
     room: str = ""
     """Kind of room; for ``near_door`` the room behind the door."""
     side: str = ""
-    """``left | right``; for ``turn`` also ``around``."""
+    """``left | right``; for ``turn`` also ``around``; for ``climb`` ``up | down``."""
     ordinal: int = 0
     """1, 2, ...; -1 is the last; 0 was not said."""
     landmark: str = ""
@@ -62,6 +62,7 @@ def describe(clause: Clause) -> str:
         "end": f"Go to the end of {room or 'this room'}",
         "door": f"Go through the {ordinal}door{beside}{side}",
         "near_door": f"Go to the door of {room}{side}" if room else f"Go to the door{beside}{side}",
+        "climb": "Go downstairs" if clause.side == "down" else "Go upstairs",
         "straight": "Go straight ahead",
         "pass": f"Go past the {clause.thing or clause.room}{side}",
         "see": f"Go on until you spot the {clause.thing}",

@@ -75,6 +75,12 @@ _PHRASES: dict[tuple[str, str], str] = {
     ("ordinal", "3"): "third|3rd",
     ("ordinal", "4"): "fourth|4th",
     ("ordinal", "-1"): "last|final",
+    ("climb", "up"): "upstairs|up the stairs|up the staircase|up the stairway|up the steps|"
+    "climb the stairs|climb the staircase|climb the steps|take the stairs up|take the stairs|"
+    "upper floor|upper storey|floor above|next floor up|top floor|one floor up",
+    ("climb", "down"): "downstairs|down the stairs|down the staircase|down the stairway|"
+    "down the steps|take the stairs down|descend the stairs|descend the staircase|"
+    "lower floor|lower storey|floor below|ground floor|one floor down",
     ("thing", "door"): "door|doorway|archway|opening|doors|door frame|entrance door|exit door|"
     "open door",
 }

@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from unilavira_drake.mllm.request import LanguageVariables, WaypointNote
+from unilavira_drake.mllm.request import OTHER_FLOOR, LanguageVariables, WaypointNote
 from unilavira_drake.mllm.rules.clauses import Clause
 from unilavira_drake.mllm.rules.scene import Scene
 from unilavira_drake.mllm.rules.vocabulary import HUBS, class_match, color_name
@@ -18,6 +18,7 @@ SCENE_LIMIT = 110
 
 _ROOM = re.compile(r"In the ([a-z' ]+?)(?=[;.]|$)")
 _EXIT = re.compile(r"([a-z' ]+|\?) ([+-]\d+) deg (\d+\.\d) m")
+_CLIMBED = re.compile(r"go_stair (up|down): arrived")
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,8 @@ class Place:
     sees: str
     offered: bool
     tried: tuple[str, ...]
+    elsewhere: bool = False
+    """Whether it is on another floor: near only on a plan."""
 
     @property
     def distance(self) -> float:
@@ -62,7 +65,14 @@ def _place(note: WaypointNote) -> Place:
         sees,
         note.offered,
         note.tried,
+        note.scene.startswith(OTHER_FLOOR),
     )
+
+
+def climbed(decision: str) -> str:
+    """Returns ``up`` or ``down`` where a past decision led over stairs, else nothing."""
+    found = _CLIMBED.search(decision)
+    return found.group(1) if found else ""
 
 
 def scene_sentence(scene: Scene, heading: float) -> str:

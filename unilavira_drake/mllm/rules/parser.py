@@ -50,6 +50,8 @@ def _tidy(clauses: list[Clause], mentions: list[Noun]) -> tuple[Clause, ...]:
             clause.color,
             clause.room,
         )
+        if clause.kind == "climb" and clause == last:
+            continue
         if same and clause.kind == "stop" and last.kind in ("go", "see"):
             tidy[-1] = dataclasses.replace(last, kind="stop")
         elif same and clause.kind == "go" and last.kind in ("go", "stop"):

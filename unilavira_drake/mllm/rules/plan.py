@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from unilavira_drake.messages import TodoItem
 from unilavira_drake.mllm.rules.clauses import Clause, describe
 from unilavira_drake.mllm.rules.lexicon import tokenize
-from unilavira_drake.mllm.rules.memory import Place
+from unilavira_drake.mllm.rules.memory import Place, climbed
 from unilavira_drake.mllm.rules.parser import parse
 from unilavira_drake.tasks import asks
 
@@ -74,6 +74,8 @@ def steps_from_history(
         elif clause.kind in ("enter", "through", "along") and reached:
             done = clause.room in rooms[seen:]
             seen += rooms[seen:].index(clause.room) if done else 0
+        elif clause.kind == "climb" and reached:
+            done = any(climbed(text) == clause.side for text in decisions)
         elif clause.kind == "turn" and reached and clause.side in turns:
             turns.remove(clause.side)
             done = True

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from unilavira_drake.mllm.rules.clauses import Clause
-from unilavira_drake.mllm.rules.memory import is_hub
+from unilavira_drake.mllm.rules.memory import climbed, is_hub
 from unilavira_drake.mllm.rules.plan import Step
 from unilavira_drake.mllm.rules.sight import angle_between
 from unilavira_drake.mllm.rules.situation import Situation
@@ -111,11 +111,13 @@ def _met(clause: Clause, situation: Situation) -> str:
     if clause.kind == "see":
         seen = scene.matching(clause)
         return f"{seen[0].name} in view ({seen[0].id})" if seen else ""
-    if clause.kind == "near_door":
-        return _at_door(clause, situation)
-    if clause.kind == "end":
-        return _at_end(clause, situation)
-    return ""
+    others = {"near_door": _at_door, "end": _at_end, "climb": _climbed}
+    return others[clause.kind](clause, situation) if clause.kind in others else ""
+
+
+def _climbed(clause: Clause, situation: Situation) -> str:
+    arrived = climbed(situation.variables.last_action) == clause.side
+    return f"one floor {clause.side}, {_underfoot(situation)}" if arrived else ""
 
 
 def _underfoot(situation: Situation) -> str:

@@ -15,6 +15,7 @@ from unilavira_drake.mllm.rules.lexicon import Token, is_courtesy
 from unilavira_drake.mllm.rules.meaning import Segment
 from unilavira_drake.mllm.rules.nouns import DOOR, Noun, read_noun
 
+_ON_FLOOR = ("upstairs", "downstairs", "upper", "lower", "floor", "ground", "top", "one", "next")
 _NEW_ACTION = ("move", "stop", "turn", "turn_back", "search", "leave", "out")
 _STARTS_NOUN = ("thing", "room", "here", "next_room", "color", "ordinal", "side")
 _ROLE_VERBS = (
@@ -64,10 +65,11 @@ class Reader:
     def _read(self, token: Token) -> None:
         """Takes a token that starts no noun phrase."""
         segment, kind = self._open, token.kind
+        readers = {"role": self._set_role, "climb": self._climb}
         if kind in _NEW_ACTION:
             self._action(token)
-        elif kind == "role":
-            self._set_role(token)
+        elif kind in readers:
+            readers[kind](token)
         elif kind in ("until", "when", "before", "hint"):
             self._condition(token)
         elif kind in ("in", "on", "from", "see"):
@@ -82,6 +84,15 @@ class Reader:
             segment.ordinal = int(token.value)
         elif kind == "word" and not is_courtesy(token.value):
             segment.words.append(token.value)
+
+    def _climb(self, token: Token) -> None:
+        """Takes stairs; what is said to be on another floor is gone to after them."""
+        clause, made = Clause("climb", side=token.value), self._open.made
+        if made and token.text.split()[0] in _ON_FLOOR:
+            made.insert(0, clause)
+        else:
+            made.append(clause)
+        self._open.role = ""
 
     def _condition(self, token: Token) -> None:
         segment = self._open

@@ -97,4 +97,5 @@ def assess(request: MllmRequest) -> Situation:
         steps = steps_from_history(clauses, places, decisions)
     else:
         steps = steps_of(variables.todo)
+    places = tuple(place for place in places if not place.elsewhere)
     return Situation(variables, scene, places, tuple(steps), request.seed * 1000 + request.n)

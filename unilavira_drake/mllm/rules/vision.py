@@ -14,6 +14,7 @@ from unilavira_drake.mllm.rules.floor_camera import FloorCamera
 from unilavira_drake.mllm.rules.lexicon import tokenize
 from unilavira_drake.mllm.rules.vocabulary import (
     HUBS,
+    STAIRS,
     class_match,
     color_name,
     room_kind,
@@ -52,6 +53,8 @@ def _selection(variables: VisionVariables, evidence: Sequence[ViewEvidence]) -> 
     view = next((v for v in evidence if v.direction == variables.direction), None)
     if view is None:
         return _nothing("there is no evidence for this view")
+    if variables.stair:
+        return _stairs(view)
     found = _ORDER.search(variables.reasoning_action)
     if found is None:
         return _free_text(variables, view)
@@ -65,6 +68,15 @@ def _selection(variables: VisionVariables, evidence: Sequence[ViewEvidence]) -> 
     if target.startswith("floor of the "):
         return _floor(view, target.removeprefix("floor of the "), bearing)
     return _thing(view, target, distance, bearing)
+
+
+def _stairs(view: ViewEvidence) -> dict[str, Any]:
+    """Selects the stairs of a view: their steps as far as they are seen."""
+    seen = [d for d in view.detections if d.category == STAIRS]
+    if not seen:
+        return _nothing("no stairs in this view")
+    d = max(seen, key=lambda d: (d.pixels, d.id))
+    return _reply(STAIRS, f"detection {d.id}", box=[*d.box])
 
 
 def _reply(target: str, why: str, **selected: Any) -> dict[str, Any]:

@@ -24,6 +24,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "gym": ("exercise room", "fitness room"),
     "stairwell": ("staircase", "stairs", "stairway"),
 }
+STAIRS = "stairs"
+"""Category of a flight of stairs."""
 HUBS = ("corridor", "entrance hall", "stairwell")
 """Rooms whose purpose is to lead to other rooms."""
 
