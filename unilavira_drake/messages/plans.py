@@ -71,6 +71,15 @@ class Path(Message):
     """Counts the replans of this goal."""
     p_WP: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
     """(k, 2) float64, in the air (k, 3), metres in the world, from the robot to the goal."""
+    backwards: bool = False
+    """Whether the robot goes it backwards, straight, to get off where it is stuck."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))
+
+
+@dataclass(frozen=True)
+class Awaited(Message):
+    """Since when a model's reply is awaited, simulated seconds; None: none is."""
+
+    since: float | None = None
