@@ -122,8 +122,7 @@ def free_travel(
     """Returns the travel with a constant twist, sideways too, until a cell is met, metres.
 
     What the base covers at the start is ignored, as in :func:`free_distance`; what lies within the
-    standoff at the start counts only if the base comes nearer.  The motion is looked at in steps
-    of a quarter of a cell.
+    standoff at the start counts only if the base comes nearer.
 
     Args:
         log_odds: as in :func:`free_distance`, like what is not named here.
@@ -142,7 +141,8 @@ def free_travel(
     length, width = footprint.half_length + footprint.standoff, footprint.half_width + half_cell
     reach = math.hypot(length, width) + horizon
     c, s = math.cos(yaw), math.sin(yaw)
-    step = resolution / 4.0
+    # No corner moves more than a quarter of a cell in a step.
+    step = resolution / 4.0 / (1.0 + abs(wz) * math.hypot(length, width) / speed)
     best = horizon
     rows, columns = log_odds.shape
     for row in range(rows):
@@ -163,10 +163,11 @@ def free_travel(
             while travel < best:
                 time = travel / speed
                 turned = wz * time
-                # Mid-point of the arc: exact to the third order of the turn.
+                # The chord of the arc points half the turn aside.
                 cm, sm = math.cos(turned / 2.0), math.sin(turned / 2.0)
-                qx = px - (cm * vx - sm * vy) * time
-                qy = py - (sm * vx + cm * vy) * time
+                chord = time if abs(turned) < 1e-6 else time * sm / (turned / 2.0)
+                qx = px - (cm * vx - sm * vy) * chord
+                qy = py - (sm * vx + cm * vy) * chord
                 ct, st = math.cos(turned), math.sin(turned)
                 if abs(ct * qx + st * qy) < length and abs(ct * qy - st * qx) < width:
                     best = travel - step
