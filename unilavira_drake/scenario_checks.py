@@ -12,7 +12,7 @@ from pydrake.multibody.plant import AddMultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from unilavira_drake.errors import InputError, ScenarioError, TaskError, unknown_name
-from unilavira_drake.messages import SWEEP_ORDERS
+from unilavira_drake.messages import SWEEP_ORDERS, VIEW_YAW
 from unilavira_drake.mllm.backends import make_backend, profile_of
 from unilavira_drake.mllm.cassette_file import RECORD_MODES
 from unilavira_drake.mllm.judges import make_judge
@@ -144,9 +144,12 @@ def _check_robot(scenario: Scenario) -> None:
             f"robot.name: {robot.name!r} is another robot than !{type(robot).__name__}; "
             f"choose it by its tag, robot: !{kinds[robot.name].__name__} {{}}."
         )
-    if "front" not in robot.views or len(set(robot.views)) < len(robot.views):
+    ring = set(robot.views) & set(VIEW_YAW)
+    once = len(set(robot.views)) == len(robot.views)
+    if ring not in ({"front"}, set(VIEW_YAW)) or not once:
         raise ScenarioError(
-            f"robot.views: {robot.views} is not usable; name each camera once, front among them."
+            f"robot.views: {robot.views} is not usable; name each camera once: front alone, or "
+            f"{', '.join(VIEW_YAW)}, and others beside them."
         )
 
 
