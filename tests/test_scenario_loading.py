@@ -12,11 +12,14 @@ from hypothesis import strategies as st
 
 from unilavira_drake.errors import InputError, ScenarioError, TaskError
 from unilavira_drake.mllm.latency import ConstantLatency
-from unilavira_drake.scenario import Scenario
+from unilavira_drake.robots.unitree_g1 import UnitreeG1
+from unilavira_drake.robots.unitree_go1 import UnitreeGo1
+from unilavira_drake.scenario import Scenario, robot_kinds
 from unilavira_drake.scenario_loading import (
     dump_scenario,
     load_scenario,
     overlay_from_settings,
+    robot_setting,
     scenario_names,
 )
 from unilavira_drake.scenario_schema import Source, check_fields
@@ -83,7 +86,7 @@ def test_the_later_setting_wins_and_tags_are_read() -> None:
         ("tasks.fridge.accept=[1]", ["tasks.fridge.accept.0", "quotes"]),
         ("language_latency=!ConstantLatensy {}", ["did you mean '!ConstantLatency'"]),
         ("language_latency.seconds=3", ["needs a tag", "!ConstantLatency"]),
-        ("robot=!Spot {}", ["robot", "takes no tag", "!Spot"]),
+        ("robot=!Spot {}", ["robot", "unknown tag", "!CobotMagic"]),
         ("tick=0.055", ["tick", "plant.time_step (0.025)", "0.05"]),
         ("robot.control_period=0.004", ["robot.control_period", "0.004", "0.025"]),
         ("tick=.nan", ["tick", "nan", "a positive number"]),
@@ -100,6 +103,14 @@ def test_the_later_setting_wins_and_tags_are_read() -> None:
         ("prompt_preset=papre", ["prompt_preset", "did you mean 'paper'"]),
         ("world.name=flta", ["world.name", "did you mean 'flat'"]),
         ("robot.name=cobot", ["robot.name", "did you mean 'cobot_magic'"]),
+        ("robot.name=unitree_g1", ["robot.name", "another robot", "robot: !UnitreeG1 {}"]),
+        ("robot.views=[front, left]", ["robot.views", "front alone"]),
+        ("robot.views=[back]", ["robot.views", "front alone"]),
+        ("robot=!UnitreeG1 {command_period: 0.03}", ["robot.command_period", "plant.time_step"]),
+        ("robot=!UnitreeGo1 {gait: {frequency: 0}}", ["robot.gait.frequency", "positive"]),
+        ("pose_estimate.position_drift=-1", ["pose_estimate.position_drift", "not negative"]),
+        ("pose_estimate={position_noise: 1, period: 0.03}", ["pose_estimate.period"]),
+        ("exposure.mode=lockt", ["exposure.mode", "did you mean 'locked'"]),
         ("language_model=rulez", ["language_model", "rulez"]),
         ("default_task=frige", ["default_task", "did you mean 'fridge'"]),
         ("tasks.fridge.family=vnl", ["tasks.fridge.family", "did you mean 'vln'"]),
@@ -190,3 +201,32 @@ def test_any_tree_loads_or_is_told_to_be_wrong(tree: dict[str, object]) -> None:
 def test_any_text_loads_or_is_told_to_be_wrong(text: str) -> None:
     with contextlib.suppress(InputError):
         assert isinstance(load_scenario("flat", text), Scenario)
+
+
+def test_a_robot_is_chosen_by_name_and_changed_key_by_key() -> None:
+    choice = f"robot={robot_setting('unitree_g1')}"
+    overlay = overlay_from_settings([choice, "robot.max_speed=0.2", "robot.gait.heave=0"])
+    robot = load_scenario("flat", overlay).robot
+    assert isinstance(robot, UnitreeG1)
+    assert (robot.max_speed, robot.gait.heave, robot.gait.frequency) == (0.2, 0.0, 1.6)
+
+
+def test_an_overlay_without_a_tag_changes_the_files_robot(tmp_path: Path) -> None:
+    path = tmp_path / "own.yaml"
+    path.write_text("world: {name: flat}\nrobot: !UnitreeGo1 {max_speed: 0.3}\nstart: kitchen\n")
+    robot = load_scenario(path, "robot: {max_yaw_rate: 0.5}\ntask: {text: Go.}").robot
+    assert isinstance(robot, UnitreeGo1)
+    assert (robot.max_speed, robot.max_yaw_rate) == (0.3, 0.5)
+
+
+def test_an_unknown_robot_is_told_the_nearest_name() -> None:
+    with pytest.raises(ScenarioError, match="did you mean 'unitree_go1'"):
+        robot_setting("unitre_go1")
+
+
+@pytest.mark.parametrize("name", sorted(robot_kinds()))
+def test_each_robot_is_written_and_read_back(name: str) -> None:
+    scenario = load_scenario("flat", f"robot: {robot_setting(name)}")
+    assert scenario.robot.name == name
+    text = dump_scenario(scenario)
+    assert dump_scenario(load_scenario("flat", text)) == text

@@ -171,3 +171,4 @@ def _border(wiring: Wiring) -> None:
         wiring.give_output(role, "model_request", f"{role}_request")
         wiring.give_output(f"{role}_link", "model_reply", f"{role}_reply")
         wiring.give_output(f"{role}_link", "usage", f"{role}_usage")
+        wiring.give_wanted(f"{role}_link", "awaited", f"{role}_awaited")

@@ -191,6 +191,7 @@ def _close_the_ring(wiring: Wiring, views: Sequence[str]) -> None:
     wiring.connect("navigation", "navigation_status", "episode_monitor")
     for role in ("language", "vision"):
         wiring.connect("agent", f"{role}_usage", "episode_monitor")
+        wiring.connect_wanted("agent", f"{role}_awaited", "navigation")
 
 
 def _listen(wiring: Wiring, *, todo: bool, grounder: bool) -> None:

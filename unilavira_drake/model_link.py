@@ -10,7 +10,7 @@ from typing import Protocol
 from pydrake.systems.framework import Context
 
 from unilavira_drake.errors import MllmError, ReplyFormatError
-from unilavira_drake.messages import Message
+from unilavira_drake.messages import Awaited, Message
 from unilavira_drake.mllm.broker import Broker
 from unilavira_drake.mllm.latency import MeasuredLatency, RealTimeLatency
 from unilavira_drake.mllm.reply import Completion, MllmReply
@@ -68,6 +68,7 @@ class ModelLink(Level):
         output_ports:
         - model_reply
         - usage
+        - awaited
     """
 
     def __init__(self, *, broker: Broker, latency: Latency, period: float) -> None:
@@ -78,6 +79,11 @@ class ModelLink(Level):
         self._model_request = message_input(self, "model_request", MllmRequest())
         self.declare_output("model_reply", lambda state: state.reply, MllmReply())
         self.declare_output("usage", lambda state: state.usage, ModelUsage())
+        self.declare_output(
+            "awaited",
+            lambda state: Awaited(state.t_issue if state.pending else None),
+            Awaited(),
+        )
 
     def step(self, context: Context, state: LinkState) -> LinkState:
         """Returns the state after issuing a new request or showing a due reply."""

@@ -62,9 +62,17 @@ def _make_ground_navigation(
         period=robot.hold,
     )
     footprint = Footprint(half_length=robot.length / 2, half_width=robot.width / 2)
-    # A command reaches the wheels in the plant's next step and shows in the one after.
-    reaction = Reaction(delay=2.0 * time_step)
-    wiring.add("controller", lambda: GroundTrackingController(limits=limits, reaction=reaction))
+    # A command reaches the wheels in the plant's next step and shows in the one after; a body that
+    # walks takes it two steps later.
+    walks = robot.gait is not None
+    reaction = Reaction(delay=(4.0 if walks else 2.0) * time_step)
+    lateral = robot.max_lateral_speed if robot.holonomic else 0.0
+    wiring.add(
+        "controller",
+        lambda: GroundTrackingController(
+            limits=limits, reaction=reaction, max_lateral_speed=lateral
+        ),
+    )
     wiring.add(
         "governor",
         # At rest the map is renewed once per rest period; half a period more is a late map.
@@ -74,6 +82,9 @@ def _make_ground_navigation(
             offset=time_step,
             map_timeout=1.5 * mapping.rest_period,
             newest=NEWEST if mapping.moving else 0,
+            reaction_time=0.03 + (2.0 * time_step if walks else 0.0),
+            max_lateral_speed=lateral,
+            ramps=walks,
         ),
     )
     wiring.connect("mapper", "map", "planner")
@@ -87,6 +98,8 @@ def _make_ground_navigation(
     wiring.take_input("front.X_BC", "mapper")
     wiring.take_input("pose_estimate", "mapper", "planner", "controller", "governor")
     wiring.take_input("twist", "controller", "governor")
+    for role in ("language", "vision"):
+        wiring.take_wanted(f"{role}_awaited", "governor")
     wiring.give_output("governor", "base_command")
     wiring.give_output("planner", "navigation_status")
     wiring.give_output("planner", "path")
@@ -126,7 +139,8 @@ def _add_mapper_and_planner(
             turning_radius=robot.turning_radius,
             snap_distance=planning.snap_distance,
             tolerance=planning.tolerance,
-            stuck_time=planning.stuck_time,
+            # A slow base makes no way while it turns about.
+            stuck_time=max(planning.stuck_time, 2.0 * math.pi / robot.max_yaw_rate),
             travel_factor=planning.travel_factor,
             patience=planning.patience,
             can_climb=robot.can_climb,

@@ -23,9 +23,11 @@ from unilavira_drake.mllm.latency import (
 from unilavira_drake.people.config import PeopleConfig
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.robots.cobot_magic import CobotMagic
+from unilavira_drake.robots.localization_config import PoseEstimateConfig
 from unilavira_drake.robots.robot import Robot
 from unilavira_drake.robots.unitree_g1 import UnitreeG1
 from unilavira_drake.robots.unitree_go1 import UnitreeGo1
+from unilavira_drake.sensors.exposure_config import ExposureConfig
 
 # What may be unwired: nothing, TODO List Memory, Second Chance Backtrack, or both; or both with the
 # predecessor's one-step revert in their place.
@@ -118,6 +120,8 @@ class Scenario:
     random_seed: int = 0
     world: WorldChoice = dc.field(default_factory=WorldChoice)
     robot: RobotChoice = dc.field(default_factory=CobotMagic)
+    pose_estimate: PoseEstimateConfig = dc.field(default_factory=PoseEstimateConfig)
+    exposure: ExposureConfig = dc.field(default_factory=ExposureConfig)
     # Where the robot starts unless the task says otherwise: ROOM or X,Y,YAW.
     start: str = ""
     # Who walks about in the world.

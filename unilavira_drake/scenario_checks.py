@@ -12,7 +12,7 @@ from pydrake.multibody.plant import AddMultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from unilavira_drake.errors import InputError, ScenarioError, TaskError, unknown_name
-from unilavira_drake.messages import SWEEP_ORDERS
+from unilavira_drake.messages import SWEEP_ORDERS, VIEW_YAW
 from unilavira_drake.mllm.backends import make_backend, profile_of
 from unilavira_drake.mllm.cassette_file import RECORD_MODES
 from unilavira_drake.mllm.judges import make_judge
@@ -25,6 +25,7 @@ from unilavira_drake.mllm.latency import (
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
 from unilavira_drake.people.crowd import make_crowd, with_people
 from unilavira_drake.scenario import ABLATIONS, GROUNDERS, RENDERERS, Scenario, robot_kinds
+from unilavira_drake.sensors.exposure_config import EXPOSURES
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.tasks import FAMILIES, checked_task, success_rule
 from unilavira_drake.worlds.load import load_world
@@ -71,6 +72,11 @@ _RULES: dict[str, _Rule] = {
     "robot.gait.roll_degrees": _NOT_NEGATIVE,
     "robot.gait.pitch_degrees": _NOT_NEGATIVE,
     "robot.gait.swing_degrees": _NOT_NEGATIVE,
+    "pose_estimate.position_noise": _NOT_NEGATIVE,
+    "pose_estimate.yaw_noise_degrees": _NOT_NEGATIVE,
+    "pose_estimate.position_drift": _NOT_NEGATIVE,
+    "pose_estimate.yaw_drift_degrees": _NOT_NEGATIVE,
+    "exposure.target": ("0.01 to 1", lambda v: 0.01 <= v <= 1),
     "robot.horizontal_fov_degrees": ("between 10 and 150 degrees", lambda v: 10 <= v <= 150),
 }
 """Every other number of a scenario must be positive; Drake checks those of ``plant``."""
@@ -88,6 +94,7 @@ def validate(scenario: Scenario) -> None:
     _check_name("ablation", "ablation", scenario.ablation, ABLATIONS)
     _check_name("renderer", "renderer", scenario.renderer, RENDERERS)
     _check_name("grounder", "grounder", scenario.grounder, GROUNDERS)
+    _check_name("exposure", "exposure.mode", scenario.exposure.mode, EXPOSURES)
     _check_name("preset", "prompt_preset", scenario.prompt_preset, sorted(PROMPT_PRESETS))
     _check_robot(scenario)
     _check_name(
@@ -137,9 +144,12 @@ def _check_robot(scenario: Scenario) -> None:
             f"robot.name: {robot.name!r} is another robot than !{type(robot).__name__}; "
             f"choose it by its tag, robot: !{kinds[robot.name].__name__} {{}}."
         )
-    if "front" not in robot.views or len(set(robot.views)) < len(robot.views):
+    ring = set(robot.views) & set(VIEW_YAW)
+    once = len(set(robot.views)) == len(robot.views)
+    if ring not in ({"front"}, set(VIEW_YAW)) or not once:
         raise ScenarioError(
-            f"robot.views: {robot.views} is not usable; name each camera once, front among them."
+            f"robot.views: {robot.views} is not usable; name each camera once: front alone, or "
+            f"{', '.join(VIEW_YAW)}, and others beside them."
         )
 
 
@@ -222,6 +232,10 @@ def _check_periods(scenario: Scenario) -> None:
     for place, period in (
         ("tick", scenario.tick),
         ("robot.control_period", scenario.robot.control_period),
+        (
+            "pose_estimate.period",
+            step if scenario.pose_estimate.exact else scenario.pose_estimate.period,
+        ),
         ("robot.command_period", getattr(scenario.robot, "command_period", 0.0) or step),
     ):
         steps = period / step

@@ -25,6 +25,7 @@ from unilavira_drake.scenario import Scenario
 from unilavira_drake.sensors.rig import add_renderer
 from unilavira_drake.station_cameras import (
     add_camera_mounts,
+    add_exposure,
     add_raster_cameras,
     add_scene_cameras,
     add_scene_sensors,
@@ -78,6 +79,7 @@ def make_navigation_station(
         name: station
         input_ports:
         - base_command
+        - recalibrations (only with an error of the pose or a locked exposure; optional)
         output_ports:
         - (view).color_image
         - (view).depth_image
@@ -92,7 +94,8 @@ def make_navigation_station(
     The ports are named alike for all robots; the robot's ``views`` say which views there are.
     Images are rendered only when pulled, by one renderer for all clones of a Context:
     ``scenario.renderer`` says which.
-    ``cheat_X_WB`` is the true pose: for scoring only.
+    ``cheat_X_WB`` is the true pose: for scoring only.  ``recalibrations`` is a count: when it
+    grows, the drift of the pose is zero again, and the exposure is locked anew.
 
     Args:
         scenario: what to build.
@@ -118,14 +121,31 @@ def make_navigation_station(
     plant, scene_graph, model_instance = _add_scene(builder, scenario, world, people)
     robot = scenario.robot
     set_start(plant, model_instance, robot, start, start_height)
-    add_actuation(builder, plant, model_instance, robot, locomotion, world.ground_height)
+    add_actuation(
+        builder,
+        plant,
+        model_instance,
+        robot,
+        locomotion=locomotion,
+        localization=scenario.pose_estimate,
+        seed=scenario.random_seed,
+        ground_height=world.ground_height,
+    )
     base = plant.GetBodyByName("base", model_instance)
     if people:
         connect_people(builder, plant, people, scenario.people, base, (robot.length, robot.width))
     if scenario.renderer == "raster" and raster_works():
-        add_raster_cameras(builder, plant, scene_graph, robot, lights(mirrored=world.mirrored))
+        light = lights(mirrored=world.mirrored)
+        colors = add_raster_cameras(builder, plant, scene_graph, robot, light)
     else:
-        add_scene_cameras(builder, plant, _picture_scene(scenario, world, people), robot)
+        colors = add_scene_cameras(builder, plant, _picture_scene(scenario, world, people), robot)
+    add_exposure(
+        builder,
+        colors,
+        scenario.exposure,
+        period=scenario.tick,
+        has_recalibrations=not scenario.pose_estimate.exact,
+    )
     add_camera_mounts(builder, plant, base, robot)
     builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
     if scenario.meshcat:

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydrake.common.value import AbstractValue
 from pydrake.geometry import LightParameter, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantValueSource
 
 from unilavira_drake.robots.robot import Robot
 from unilavira_drake.sensors.camera_mounts import CameraMounts
+from unilavira_drake.sensors.exposure import ExposureControl
+from unilavira_drake.sensors.exposure_config import ExposureConfig
 from unilavira_drake.sensors.rig import (
     add_raster_rgbd_camera,
     add_rgbd_camera,
     front_intrinsics,
 )
 from unilavira_drake.sensors.scene_camera import SceneCamera
-
-IMAGES = ("color_image", "depth_image", "label_image")
 
 
 def camera_frame(view: str) -> str:
@@ -35,12 +35,16 @@ def add_raster_cameras(
     scene_graph: SceneGraph,
     robot: Robot,
     lights: Sequence[LightParameter],
-) -> None:
+) -> dict[str, OutputPort]:
     """Adds our own cameras, whose pictures depend on positions alone; a clone shares them.
 
     Front is a camera of its own, whose depth is wanted all the way; the others are one rig, drawn
     in one call.
+
+    Returns:
+        The port of each view's colours; depth and label are exported.
     """
+    colors = {}
     others = tuple(view for view in robot.views if view != "front")
     for name, views in (("front_camera", ("front",)), ("other_cameras", others)):
         if not views:
@@ -58,14 +62,17 @@ def add_raster_cameras(
         )
         for view in views:
             prefix = f"{view}." if len(views) > 1 else ""
-            for image in IMAGES:
-                port = "depth_image_32f" if image == "depth_image" else image
-                builder.ExportOutput(camera.GetOutputPort(prefix + port), f"{view}.{image}")
+            colors[view] = camera.GetOutputPort(f"{prefix}color_image")
+            depth = camera.GetOutputPort(f"{prefix}depth_image_32f")
+            builder.ExportOutput(depth, f"{view}.depth_image")
+            label = camera.GetOutputPort(f"{prefix}label_image")
+            builder.ExportOutput(label, f"{view}.label_image")
+    return colors
 
 
 def add_scene_cameras(
     builder: DiagramBuilder, plant: MultibodyPlant, scene: Diagram, robot: Robot
-) -> None:
+) -> dict[str, OutputPort]:
     """Adds Drake's cameras, on a scene of its own that serves all clones.
 
     Args:
@@ -73,12 +80,50 @@ def add_scene_cameras(
         plant: the simulated one.
         scene: what ``add_scene_sensors`` was called for.
         robot: whose views these are.
+
+    Returns:
+        The port of each view's colours; depth and label are exported.
     """
     camera = builder.AddNamedSystem("cameras", SceneCamera(scene, views=robot.views))
     builder.Connect(plant.get_state_output_port(), camera.GetInputPort("plant_state"))
     for view in robot.views:
-        for image in IMAGES:
+        for image in ("depth_image", "label_image"):
             builder.ExportOutput(camera.GetOutputPort(f"{view}.{image}"), f"{view}.{image}")
+    return {view: camera.GetOutputPort(f"{view}.color_image") for view in robot.views}
+
+
+def add_exposure(
+    builder: DiagramBuilder,
+    colors: Mapping[str, OutputPort],
+    config: ExposureConfig,
+    *,
+    period: float,
+    has_recalibrations: bool,
+) -> None:
+    """Exports the colours of all views, through an exposure control unless it is fixed.
+
+    Args:
+        builder: of the station.
+        colors: port of each view.
+        config: of the exposure.
+        period: seconds between two looks at ``recalibrations``.
+        has_recalibrations: whether the station has that input port already.
+    """
+    if config.mode == "fixed":
+        for view, port in colors.items():
+            builder.ExportOutput(port, f"{view}.color_image")
+        return
+    control = builder.AddSystem(ExposureControl(config=config, views=list(colors), period=period))
+    for view, port in colors.items():
+        builder.Connect(port, control.GetInputPort(f"{view}.raw_image"))
+        name = f"{view}.color_image"
+        builder.ExportOutput(control.GetOutputPort(name), name)
+    if control.HasInputPort("recalibrations"):
+        recalibrations = control.GetInputPort("recalibrations")
+        if has_recalibrations:
+            builder.ConnectInput("recalibrations", recalibrations)
+        else:
+            builder.ExportInput(recalibrations, "recalibrations")
 
 
 def add_scene_sensors(

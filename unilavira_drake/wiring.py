@@ -45,9 +45,19 @@ class Wiring:
         self._builder.Connect(self._output(source, port), self._input(target, target_port or port))
 
     def connect_wanted(self, source: str, port: str, target: str) -> None:
-        """Connects ports of one name where the target has such an input port."""
-        if self._levels[target].HasInputPort(port):
+        """Connects ports of one name where both levels have such a port."""
+        if self._levels[source].HasOutputPort(port) and self._levels[target].HasInputPort(port):
             self.connect(source, port, target)
+
+    def take_wanted(self, name: str, level: str) -> None:
+        """Makes an input port of the Diagram where the level has a port of that name."""
+        if self._levels[level].HasInputPort(name):
+            self.take_input(name, level)
+
+    def give_wanted(self, level: str, port: str, name: str) -> None:
+        """Makes an output port of the Diagram where the level has the port."""
+        if self._levels[level].HasOutputPort(port):
+            self.give_output(level, port, name)
 
     def take_input(self, name: str, *levels: str) -> None:
         """Makes an input port of the Diagram that feeds the port of that name of each level."""

@@ -152,9 +152,42 @@ def test_standing_still_is_stuck_even_while_the_map_changes():
     for k in range(29):
         bench.give("map", room(version=2 + k))
         assert bench.wait().state == "moving"
+        assert not bench.path.backwards
     assert bench.path.version >= 2
-    assert bench.wait(3) == NavigationStatus(1, "failed", "stuck", remaining=5.0)
+    assert bench.wait(3).state == "moving"
+    assert bench.path.backwards
+
+
+def test_a_stuck_robot_backs_off_plans_anew_and_only_then_fails():
+    bench = Bench(stuck_time=3.0)
+    bench.give("goal", go())
+    bench.wait(32)
+    back = bench.path
+    assert back.backwards
+    assert back.p_WP == pytest.approx(np.array([(1.0, 2.0), (0.6, 2.0)]))
+    bench.stand(0.65, 2.0)
+    assert bench.wait(2).state == "moving"
+    assert not bench.path.backwards
+    assert bench.path.version > back.version
+    assert bench.path.p_WP[0] == pytest.approx((0.65, 2.0), abs=0.05)
+    assert bench.wait(28).state == "moving"
+    assert bench.wait(4) == NavigationStatus(1, "failed", "stuck", remaining=5.35)
     assert not len(bench.path.p_WP)
+
+
+def test_a_robot_that_cannot_go_back_either_plans_anew_after_a_while():
+    bench = Bench(stuck_time=3.0)
+    bench.give("goal", go())
+    bench.wait(32)
+    assert bench.path.backwards
+    assert bench.wait(52).state == "moving"
+    assert not bench.path.backwards
+    assert bench.wait(32).reason == "stuck"
+    # The next goal has its own recovery.
+    bench.give("map", room(n=2))
+    bench.give("goal", go(n=2))
+    bench.wait(33)
+    assert bench.path.backwards
 
 
 def test_wandering_without_end_uses_up_the_travel_budget():

@@ -12,7 +12,11 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from unilavira_drake.messages import OccupancyMap
 from unilavira_drake.robots.drive_limits import DriveLimits
 from unilavira_drake.robots.governor import Governor
-from unilavira_drake.robots.stopping import Footprint, free_distance, stoppable_speed
+from unilavira_drake.robots.stopping import (
+    Footprint,
+    free_distance,
+    stoppable_speed,
+)
 
 LIMITS = DriveLimits()
 FOOTPRINT = Footprint()

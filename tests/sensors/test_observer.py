@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I, ImageRgba8U
 
-from unilavira_drake.messages import Intrinsics, NavigationStatus
+from unilavira_drake.messages import VIEW_YAW, Intrinsics, NavigationStatus
 from unilavira_drake.sensors.observer import Observer
 
 INTRINSICS = Intrinsics(4, 3, 2.0, 2.0, 1.5, 1.0)
@@ -25,14 +25,18 @@ class Bench:
         self.observer = Observer(intrinsics=INTRINSICS, period=0.1, **options)
         self.simulator = Simulator(self.observer)
         self.context = self.simulator.get_mutable_context()
-        for name, image in (
-            ("color_image", ImageRgba8U(4, 3)),
-            ("depth_image", ImageDepth32F(4, 3)),
-            ("label_image", ImageLabel16I(4, 3)),
-        ):
-            self.fix(f"front.{name}", Value[type(image)](image))
-        camera = RigidTransform(RollPitchYaw(-math.pi / 2, 0, -math.pi / 2), [0.2, 0, 1.0])
-        self.fix("front.X_BC", Value[RigidTransform](camera))
+        for view in options.get("views", ("front",)):
+            for name, image in (
+                ("color_image", ImageRgba8U(4, 3)),
+                ("depth_image", ImageDepth32F(4, 3)),
+                ("label_image", ImageLabel16I(4, 3)),
+            ):
+                self.fix(f"{view}.{name}", Value[type(image)](image))
+            down = view == "down"
+            turn = RollPitchYaw(math.pi if down else -math.pi / 2, 0, -math.pi / 2)
+            yaw = RotationMatrix.MakeZRotation(VIEW_YAW.get(view, 0.0))
+            camera = RigidTransform(yaw.multiply(turn.ToRotationMatrix()), [0.0, 0, 1.0])
+            self.fix(f"{view}.X_BC", Value[RigidTransform](camera))
         self.status(0, "arrived")
         self.stand(0.0, 0.0, 0.3)
 
@@ -149,3 +153,56 @@ def test_a_backtrack_to_the_same_place_with_another_front_sweeps_again() -> None
     bench.status(1, "arrived", 0.3 + math.pi / 2)
     bench.run(0.1)
     assert bench.output("sweep").active
+
+
+RING = ("front", "back", "right", "left")
+
+
+def test_a_ring_sees_all_at_once_and_need_not_turn() -> None:
+    bench = Bench(views=RING)
+    bench.run(0.05)
+    assert not bench.output("sweep").active
+    bench.run(0.1)
+    panorama = bench.output("panorama")
+    assert [f.view for f in panorama.frames] == ["front", "left", "back", "right"]
+    assert len({f.time for f in panorama.frames}) == 1
+    assert panorama.yaw == pytest.approx(0.3)
+    for view, turn in VIEW_YAW.items():
+        axis = panorama.frame(view).X_WC[:3, 2]
+        assert axis == pytest.approx([math.cos(0.3 + turn), math.sin(0.3 + turn), 0], abs=1e-9)
+
+
+def test_a_ring_turns_to_a_demanded_heading_first() -> None:
+    bench = Bench(views=RING)
+    bench.run(0.2)
+    bench.stand(1.0, 0.0, -0.5)
+    bench.status(1, "arrived", 1.2)
+    bench.run(0.2)
+    assert bench.output("panorama").n == 1
+    assert bench.output("sweep").active
+    assert bench.output("sweep").heading == pytest.approx(1.2)
+    bench.stand(1.0, 0.0, 1.21)
+    bench.run(0.2)
+    panorama = bench.output("panorama")
+    assert (panorama.n, len(panorama.frames)) == (2, 4)
+    assert panorama.yaw == pytest.approx(1.21)
+    assert not bench.output("sweep").active
+
+
+def test_a_ring_waits_for_rest() -> None:
+    bench = Bench(views=RING)
+    bench.stand(0, 0, 0.3, rate=1.0)
+    bench.run(1.0)
+    assert bench.output("panorama").n == 0
+    bench.stand(0, 0, 0.9)
+    bench.run(0.2)
+    assert bench.output("panorama").yaw == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize("views", [(*RING, "down"), ("front", "down")])
+def test_a_view_beyond_the_four_is_captured_once(views: tuple[str, ...]) -> None:
+    bench = Bench(views=views)
+    bench.sweep(0.0, 0.0)
+    panorama = bench.output("panorama")
+    assert [f.view for f in panorama.frames] == ["front", "left", "back", "right", "down"]
+    assert panorama.frame("down").X_WC[:3, 2] == pytest.approx([0, 0, -1], abs=1e-9)

@@ -78,6 +78,15 @@ class Path(Message):
     """(k, 2) float64, in the air (k, 3), metres in the world, from the robot to the goal."""
     max_speed: float = math.inf
     """No faster than this, whatever the robot's limits, m/s: stairs are climbed slowly."""
+    backwards: bool = False
+    """Whether the robot goes it backwards, straight, to get off where it is stuck."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))
+
+
+@dataclass(frozen=True)
+class Awaited(Message):
+    """Since when a model's reply is awaited, simulated seconds; None: none is."""
+
+    since: float | None = None

@@ -6,6 +6,7 @@ import dataclasses as dc
 import math
 from typing import Any
 
+import numpy as np
 from pydrake.systems.framework import Context
 
 from unilavira_drake.messages import (
@@ -25,6 +26,14 @@ from unilavira_drake.ports import Level, message_input, pose_input
 
 PROGRESS = 0.05
 """The way that remains must shrink by this much to count as progress, metres."""
+
+BACK_OFF = 0.4
+"""A robot that is stuck backs off this far, metres, ..."""
+
+BACK_OFF_TIME = 5.0
+"""... or for as long, seconds; what is behind it may be in the way, too."""
+
+MOST_RECOVERIES = 1
 
 BUDGET_BASE = 3.0
 """Travel that is always granted beyond the planned length times the travel factor, metres."""
@@ -65,6 +74,8 @@ class PlannerState(Message):
     """Since when there is no way any more, seconds; inf while there is one."""
     climb: Climb | None = None
     """Of a goal over stairs."""
+    recoveries: int = 0
+    """How often the robot has backed off on the way to this goal."""
 
 
 class FastMarchingPlanner(Level):
@@ -74,7 +85,12 @@ class FastMarchingPlanner(Level):
     anew when a new map blocks it, or when the map changed, the plan is ``replan_period`` old and
     the goal is not near.  A robot arrives facing the way it came, whatever its last small
     correction was, unless the goal names a heading.  A terminal status and the empty path are
-    views of one state.  Reasons of failure: the goal's own, ``unreachable``, ``no free space
+    views of one state.
+
+    A robot that is stuck backs off once for each goal: a short path straight back, gone backwards;
+    then the way is planned anew, to which it turns.  Stuck again, it fails.
+
+    Reasons of failure: the goal's own, ``unreachable``, ``no free space
     within ... m``, ``stuck``, ``travel budget``.
 
     Over stairs (``climb``, ``descend``) the robot drives to their foot first, then straight and
@@ -157,7 +173,11 @@ class FastMarchingPlanner(Level):
     def _go_on(self, context: Context, state: PlannerState, time: float) -> PlannerState:
         position = self._position(context)
         if state.climb is None or not state.climb.begun:
-            after = self._follow(state, self._map(context), position, time)
+            occupancy = self._map(context)
+            if state.path.backwards:
+                after = self._back_off(state, occupancy, position, time)
+            else:
+                after = self._follow(context, state, occupancy, time)
             # The end of the way to the foot is forgotten with its goal.
             after = after if state.climb is None else dc.replace(after, climb=state.climb)
             return self._set_off(context, after, time)
@@ -232,9 +252,38 @@ class FastMarchingPlanner(Level):
             budget=max(state.budget, self._travel_factor * plan.length + BUDGET_BASE),
         )
 
-    def _follow(
+    def _recover(self, context: Context, state: PlannerState, time: float) -> PlannerState:
+        """Returns the state with a way straight back from where the robot is stuck."""
+        R_WB = self._pose(context).rotation().matrix()
+        ahead = math.atan2(R_WB[1, 0], R_WB[0, 0])
+        x, y = self._position(context)
+        back = (x - BACK_OFF * math.cos(ahead), y - BACK_OFF * math.sin(ahead))
+        path = Path(state.path.n, state.path.version + 1, np.array([(x, y), back]), backwards=True)
+        return dc.replace(
+            state, path=path, plan_time=time, progress_time=time, recoveries=state.recoveries + 1
+        )
+
+    def _back_off(
         self, state: PlannerState, occupancy: OccupancyMap, position: Point, time: float
     ) -> PlannerState:
+        """Returns the state with a new plan once the robot has backed off."""
+        x, y = state.path.p_WP[-1].tolist()
+        there = math.dist(position, (x, y)) <= self._tolerance
+        if not there and time - state.plan_time < BACK_OFF_TIME:
+            return state
+        plan = make_plan(
+            occupancy,
+            position=position,
+            target=state.target,
+            viewpoint=state.viewpoint,
+            parameters=self._parameters,
+        )
+        return self._planned(dc.replace(state, progress_time=time), plan, occupancy, time)
+
+    def _follow(
+        self, context: Context, state: PlannerState, occupancy: OccupancyMap, time: float
+    ) -> PlannerState:
+        position = self._position(context)
         points = state.path.p_WP
         goal = (float(points[-1, 0]), float(points[-1, 1]))
         left = math.dist(position, state.target)
@@ -251,6 +300,8 @@ class FastMarchingPlanner(Level):
         if remaining <= state.least_remaining - PROGRESS:
             state = dc.replace(state, least_remaining=remaining, progress_time=time)
         elif time - state.progress_time > self._stuck_time:
+            if state.recoveries < MOST_RECOVERIES and all(map(math.isfinite, position)):
+                return self._recover(context, state, time)
             return _done(state.status.n, "failed", "stuck", None, left)
         return self._replanned(state, occupancy, position, goal, time)
 

@@ -7,6 +7,8 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import DiagramBuilder, System
 
 from unilavira_drake.robots.ground_actuation import add_ground_actuation, set_ground_start
+from unilavira_drake.robots.localization_config import PoseEstimateConfig
+from unilavira_drake.robots.pose_estimator import PoseEstimator
 from unilavira_drake.robots.robot import GroundRobot, Robot
 from unilavira_drake.robots.terrain import GroundHeight
 
@@ -16,13 +18,17 @@ def add_actuation(
     plant: MultibodyPlant,
     model_instance: ModelInstanceIndex,
     robot: Robot,
+    *,
     locomotion: System | None = None,
+    localization: PoseEstimateConfig | None = None,
+    seed: int = 0,
     ground_height: GroundHeight | None = None,
 ) -> None:
     """Adds what turns ``base_command`` into motion, and says where the robot is.
 
     Exports the input ``base_command`` and the outputs ``pose_estimate``, ``twist`` and
-    ``cheat_X_WB`` of the Diagram that is built.
+    ``cheat_X_WB`` of the Diagram that is built; with an error of the estimate also the input
+    ``recalibrations``.
 
     Args:
         builder: of the station.
@@ -31,15 +37,29 @@ def add_actuation(
         robot: its type chooses the kind of actuation.
         locomotion: a System of the user's own in the place of ours, with its ports: a gait policy,
             a whole-body controller.
+        localization: the error of the pose estimate; none when None.
+        seed: of that error.
         ground_height: of the world, for a robot that climbs.
 
     Raises:
         TypeError: if nothing is known to move such a robot.
     """
     if isinstance(robot, GroundRobot):
-        add_ground_actuation(builder, plant, model_instance, robot, locomotion, ground_height)
+        X_WB, twist = add_ground_actuation(
+            builder, plant, model_instance, robot, locomotion, ground_height
+        )
     else:
         raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")
+    builder.ExportOutput(X_WB, "cheat_X_WB")
+    builder.ExportOutput(twist, "twist")
+    if localization is None or localization.exact:
+        builder.ExportOutput(X_WB, "pose_estimate")
+        return
+    estimator = builder.AddSystem(PoseEstimator(config=localization, seed=seed))
+    builder.Connect(X_WB, estimator.GetInputPort("X_WB"))
+    builder.Connect(twist, estimator.GetInputPort("twist"))
+    builder.ExportInput(estimator.GetInputPort("recalibrations"), "recalibrations")
+    builder.ExportOutput(estimator.GetOutputPort("pose_estimate"), "pose_estimate")
 
 
 def set_start(

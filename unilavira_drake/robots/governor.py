@@ -9,23 +9,36 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from unilavira_drake.messages import OccupancyMap, read_only
+from unilavira_drake.messages import Awaited, OccupancyMap, read_only
 from unilavira_drake.ports import message_input, pose_input, vector_input
 from unilavira_drake.robots.drive_limits import DriveLimits, approach
-from unilavira_drake.robots.stopping import Footprint, free_distance, stoppable_speed, warm_up
+from unilavira_drake.robots.stopping import (
+    Footprint,
+    free_distance,
+    free_travel,
+    stoppable_speed,
+    stoppable_speed_from,
+    warm_up,
+)
+
+MOVING = 0.05
+"""A base that measures a higher speed must see its pose change, m/s."""
 
 
 class Governor(LeafSystem):
-    """Lets a differential base do only what is finite, fresh, within its limits and free ahead.
+    """Lets a ground robot do only what is finite, fresh, within its limits and free ahead.
 
-    * Speed, yaw rate and both accelerations are clamped; vy is zero.
-    * A command that is not finite, or older than ``command_timeout``, counts as zero.
-    * The base translates only on a map not older than ``map_timeout``, and only so fast that it
-      still stops (v^2 / 2a and one period) before its leading edge meets an occupied cell.
+    * Speeds, yaw rate and accelerations are clamped; vy is zero on a differential base.
+    * A command that is not finite, or older than ``command_timeout``, counts as zero; so does any
+      while a model's reply is awaited for longer than ``reply_timeout``.
+    * The base translates only on a map not older than ``map_timeout``, with a pose and a twist that
+      are finite and a pose that changes when the twist says so, and only so fast that it still
+      stops (v^2 / 2a and one period) before its leading edge meets an occupied cell.
     * Turning in place is never blocked: it is how a base gets out of a corner.
     * Zero is reached by braking, never by a jump.
 
-    The state is the previous command.  At rest under a zero command nothing is evaluated.
+    The state is the previous command, and when the pose last changed.  At rest under a zero
+    command nothing is evaluated.
 
     .. pydrake_system::
 
@@ -35,6 +48,8 @@ class Governor(LeafSystem):
         - map
         - pose_estimate
         - twist
+        - language_awaited (optional)
+        - vision_awaited (optional)
         output_ports:
         - base_command
 
@@ -51,6 +66,10 @@ class Governor(LeafSystem):
         map_timeout: seconds; longer than a mapper's period at rest.
         newest: cells of at most so much log-odds are things that move, see ``MappingParameters``.
         courtesy: what stays free before and beside the base to things that move, metres.
+        reply_timeout: seconds.
+        pose_timeout: for which a moving base's pose may stay the same, seconds.
+        max_lateral_speed: m/s; 0 for a differential base.
+        ramps: whether the body itself slows down by its acceleration, as a walking one does.
     """
 
     def __init__(
@@ -64,6 +83,10 @@ class Governor(LeafSystem):
         map_timeout: float = 3.0,
         newest: int = 0,
         courtesy: tuple[float, float] = (0.35, 0.10),
+        reply_timeout: float = 150.0,
+        pose_timeout: float = 0.3,
+        max_lateral_speed: float = 0.0,
+        ramps: bool = False,
     ) -> None:
         super().__init__()
         warm_up()
@@ -76,76 +99,143 @@ class Governor(LeafSystem):
         self._shy = footprint._replace(
             standoff=courtesy[0], half_width=footprint.half_width + courtesy[1]
         )
+        self._reply_timeout = reply_timeout
+        self._pose_timeout = max(pose_timeout, 1.5 * limits.period)
+        self._max_lateral_speed = max_lateral_speed
+        self._ramps = ramps
         self._desired = vector_input(self, "desired_command", 4)
         self._map = message_input(self, "map", OccupancyMap())
         self._pose = pose_input(self, "pose_estimate")
         self._twist = vector_input(self, "twist", 6)
+        self._awaited = tuple(
+            message_input(self, f"{role}_awaited", Awaited()) for role in ("language", "vision")
+        )
         index = self.DeclareDiscreteState(3)
         self._command_index = int(index)
+        # x, y, yaw that were seen last, and the time at which they were new.
+        unseen: Any = np.full(4, -math.inf)
+        self._seen_index = int(self.DeclareDiscreteState(unseen))
         self.DeclareStateOutputPort("base_command", index)
         self.DeclarePeriodicDiscreteUpdateEvent(limits.period, offset, self._update)
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         limits = self._limits
-        desired_speed, _, desired_rate, t_issued = self._desired(context).tolist()
-        fresh = abs(context.get_time() - t_issued) <= self._command_timeout
-        if not (fresh and math.isfinite(desired_speed) and math.isfinite(desired_rate)):
-            desired_speed = desired_rate = 0.0
+        desired_speed, desired_lateral, desired_rate = self._fresh_desire(context)
         old: Any = context.get_discrete_state(self._command_index).value()
-        old_speed, _, old_rate = old.tolist()
-        if desired_speed == desired_rate == old_speed == old_rate == 0.0:
+        old_speed, old_lateral, old_rate = old.tolist()
+        if not (desired_speed or desired_lateral or desired_rate or old.any()):
             return
         step = limits.max_acceleration * limits.period
-        speed = approach(old_speed, desired_speed, step)
-        speed = approach(0.0, speed, limits.max_speed)
+        speed = approach(0.0, approach(old_speed, desired_speed, step), limits.max_speed)
+        lateral = approach(old_lateral, desired_lateral, step)
+        lateral = approach(0.0, lateral, self._max_lateral_speed)
         turn_step = limits.max_yaw_acceleration * limits.period
         rate = approach(old_rate, desired_rate, turn_step)
         rate = approach(0.0, rate, limits.max_yaw_rate)
-        if speed != 0.0:
-            allowed = self._allowed_speed(context, speed, rate)
+        if speed != 0.0 or lateral != 0.0:
+            before = math.hypot(old_speed, old_lateral)
+            wanted = math.hypot(speed, lateral)
+            allowed = self._allowed_speed(context, discrete_state, speed, lateral, rate, before)
             # Braking is limited too, so a late obstacle may leave more than is allowed.
-            slowest = max(abs(old_speed) - step, 0.0) if speed * old_speed > 0.0 else 0.0
-            speed = math.copysign(min(abs(speed), max(allowed, slowest)), speed)
-        command = np.array([speed, 0.0, rate])
+            same_way = speed * old_speed + lateral * old_lateral > 0.0
+            slowest = max(before - step, 0.0) if same_way else 0.0
+            least = min(wanted, max(allowed, slowest))
+            if lateral == 0.0:
+                speed = math.copysign(least, speed)
+            else:
+                speed, lateral = speed * least / wanted, lateral * least / wanted
+        command = np.array([speed, lateral, rate])
         discrete_state.set_value(self._command_index, command)  # type: ignore[arg-type]
 
-    def _allowed_speed(self, context: Context, speed: float, rate: float) -> float:
+    def _fresh_desire(self, context: Context) -> tuple[float, float, float]:
+        """The desired vx, vy and wz, or zero where that is late or makes no sense."""
+        speed, lateral, rate, t_issued = self._desired(context).tolist()
+        time = context.get_time()
+        # Not a number is not less, either.
+        fresh = abs(time - t_issued) <= self._command_timeout
+        if not (fresh and math.isfinite(speed + lateral + rate)):
+            return 0.0, 0.0, 0.0
+        if speed or lateral or rate:
+            for reader in self._awaited:
+                awaited = reader.optional(context)
+                since = None if awaited is None else awaited.since
+                if since is not None and time - since > self._reply_timeout:
+                    return 0.0, 0.0, 0.0
+        return speed, lateral, rate
+
+    def _allowed_speed(
+        self,
+        context: Context,
+        discrete_state: DiscreteValues,
+        speed: float,
+        lateral: float,
+        rate: float,
+        before: float,
+    ) -> float:
         """How fast the base may go along the arc of this command, m/s, never negative."""
-        limits, footprint = self._limits, self._footprint
+        limits = self._limits
         map_ = self._map(context)
         X_WB = self._pose(context).GetAsMatrix34()
-        if context.get_time() - map_.time > self._map_timeout or not np.isfinite(X_WB).all():
+        vx, vy = self._twist(context)[3:5].tolist()
+        measured = math.hypot(vx, vy) if self._max_lateral_speed else abs(vx)
+        finite = np.isfinite(X_WB).all() and math.isfinite(measured)
+        late = context.get_time() - map_.time > self._map_timeout
+        if late or not finite or self._stands_still(context, discrete_state, X_WB, measured):
             return 0.0
-        measured = self._twist(context)[3]
-        overrun = abs(measured) * self._reaction_time if math.isfinite(measured) else 0.0
-        horizon = speed**2 / (2.0 * limits.max_acceleration) + abs(speed) * limits.period + overrun
+        overrun = measured * self._reaction_time
+        top = math.hypot(speed, lateral)
+        fastest = max(top, before) if self._ramps else top
+        way = fastest**2 / (2.0 * limits.max_acceleration) + fastest * limits.period
+        horizon = way + overrun
+        free = self._free(map_, X_WB, (speed, lateral, rate), horizon)
+        if free >= horizon:
+            return top
+        if self._ramps:
+            return float(
+                stoppable_speed_from(before, free - overrun, limits.max_acceleration, limits.period)
+            )
+        return float(stoppable_speed(free - overrun, limits.max_acceleration, limits.period))
+
+    def _stands_still(
+        self,
+        context: Context,
+        discrete_state: DiscreteValues,
+        X_WB: Any,
+        measured: float,
+    ) -> bool:
+        """Whether the pose has stayed the same too long for a base that moves."""
+        seen: Any = context.get_discrete_state(self._seen_index).value()
+        time = context.get_time()
+        now = np.array([X_WB[0, 3], X_WB[1, 3], math.atan2(X_WB[1, 0], X_WB[0, 0]), time])
+        if not np.array_equal(seen[:3], now[:3]):
+            discrete_state.set_value(self._seen_index, now)  # type: ignore[arg-type]
+            return False
+        return measured > MOVING and time - float(seen[3]) > self._pose_timeout
+
+    def _free(
+        self,
+        map_: OccupancyMap,
+        X_WB: Any,
+        twist: tuple[float, float, float],
+        horizon: float,
+    ) -> float:
+        """Travel along the arc of a twist until the base meets something, metres."""
         x, y = float(X_WB[0, 3]), float(X_WB[1, 3])
-        yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
-        widest = self._shy if self._newest else footprint
+        pose = (x, y, math.atan2(X_WB[1, 0], X_WB[0, 0]))
+        widest = self._shy if self._newest else self._footprint
         size = math.hypot(widest.half_length + widest.standoff, widest.half_width)
         log_odds, first = map_.around(x, y, size + horizon)
+        speed, lateral, rate = twist
 
         def met(cells: NDArray[np.int8], footprint: Footprint) -> float:
-            return float(
-                free_distance(
-                    cells,
-                    map_.origin,
-                    map_.resolution,
-                    x,
-                    y,
-                    yaw,
-                    rate / speed,
-                    speed < 0.0,
-                    horizon,
-                    footprint,
-                    first,
-                )
-            )
+            grid = (cells, map_.origin, map_.resolution)
+            if lateral != 0.0:
+                return float(free_travel(*grid, pose, twist, horizon, footprint, first))
+            arc = (rate / speed, speed < 0.0)
+            return float(free_distance(*grid, *pose, *arc, horizon, footprint, first))
 
-        free = met(log_odds, footprint)
+        free = met(log_odds, self._footprint)
         if self._newest:
             moving = np.where(log_odds <= self._newest, log_odds, 0).astype(np.int8)
             free = min(free, met(read_only(moving), self._shy))
-        if free >= horizon:
-            return abs(speed)
-        return float(stoppable_speed(free - overrun, limits.max_acceleration, limits.period))
+        return free

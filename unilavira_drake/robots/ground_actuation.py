@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import DiagramBuilder, System
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
 from unilavira_drake.robots.planar_base import BASE_JOINTS, HEIGHT_JOINT, PlanarBase
 from unilavira_drake.robots.planar_pose import PlanarPose
@@ -23,8 +23,12 @@ def add_ground_actuation(
     robot: GroundRobot,
     locomotion: System | None = None,
     ground_height: GroundHeight | None = None,
-) -> None:
-    """Adds the base of a ground robot; see ``add_actuation``."""
+) -> tuple[OutputPort, OutputPort]:
+    """Adds the base of a ground robot; see ``add_actuation``.
+
+    Returns:
+        The ports of the true pose X_WB and of the twist.
+    """
     if robot.gait is None and locomotion is None:
         locomotion = PlanarBase(holonomic=robot.holonomic)
     joints = joint_names(plant, model_instance)
@@ -58,9 +62,7 @@ def add_ground_actuation(
     builder.ExportInput(locomotion.GetInputPort("base_command"), "base_command")
     pose = builder.AddSystem(PlanarPose(joints=joints))
     builder.Connect(state, pose.GetInputPort("joint_state"))
-    builder.ExportOutput(pose.GetOutputPort("X_WB"), "pose_estimate")
-    builder.ExportOutput(pose.GetOutputPort("X_WB"), "cheat_X_WB")
-    builder.ExportOutput(pose.GetOutputPort("twist"), "twist")
+    return pose.GetOutputPort("X_WB"), pose.GetOutputPort("twist")
 
 
 def set_ground_start(

@@ -22,13 +22,19 @@ MAX_LOOKAHEAD = 0.50
 CORNER_CUT = 0.04
 """The chord to the lookahead point cuts a corner by at most this much, metres, ..."""
 LOOKAHEAD_TIME = 0.5
-"""... and the base takes at least this long to reach that point, seconds."""
+"""... and the base takes at least this long to reach that point, seconds, ..."""
+LOOKAHEAD_PERIODS = 1.5
+"""... and this many of its periods."""
 LATERAL_ACCELERATION = 0.5
 """Bound on v^2 times curvature, m/s^2."""
 STOP_ANGLE = 1.0
 """A moving base stops and turns when the lookahead point is farther off than this, radians;"""
 START_ANGLE = 0.2
 """a standing base sets off when it is nearer than this."""
+BACK_SPEED = 0.2
+"""A base that is stuck backs off this slowly, m/s."""
+LATERAL_GAIN = 0.8
+"""Sideways speed by distance from the path, 1/s."""
 END_DISTANCE = 0.03
 """The path is done within this distance of its end, metres."""
 HEADING_DEAD_ZONE = 0.003
@@ -147,7 +153,8 @@ def _speed_limit(
 ) -> float:
     """The speed at which the base can still turn as the path does and stop at its end, m/s."""
     bend = max(abs(curvature), 1e-6)
-    speed = min(limits.max_speed, lookahead / LOOKAHEAD_TIME, 0.8 * limits.max_yaw_rate / bend)
+    reach_time = max(LOOKAHEAD_TIME, LOOKAHEAD_PERIODS * limits.period)
+    speed = min(limits.max_speed, lookahead / reach_time, 0.8 * limits.max_yaw_rate / bend)
     speed = min(speed, math.sqrt(LATERAL_ACCELERATION / bend)) * max(math.cos(angle), 0.3)
     return min(speed, braking_speed(way, 0.8 * limits.max_acceleration, limits.period))
 
@@ -202,6 +209,62 @@ def track_path(
     return speed, approach(previous_rate, curvature * speed, turn_step)
 
 
+@kernel
+def back_off(
+    left: float, previous_speed: float, previous_rate: float, limits: DriveLimits
+) -> tuple[float, float]:
+    """Returns (speed, yaw rate) with which a base goes straight back to a point behind it.
+
+    Args:
+        left: distance to the point, metres.
+        previous_speed: previous command, m/s.
+        previous_rate: previous command, rad/s.
+        limits: limits of the base.
+    """
+    speed = min(BACK_SPEED, braking_speed(left, 0.8 * limits.max_acceleration, limits.period))
+    if left <= END_DISTANCE:
+        speed = 0.0
+    return (
+        approach(previous_speed, -speed, limits.max_acceleration * limits.period),
+        approach(previous_rate, 0.0, limits.max_yaw_acceleration * limits.period),
+    )
+
+
+@kernel
+def lateral_speed(
+    p_WP: NDArray[np.float64],
+    x: float,
+    y: float,
+    yaw: float,
+    speed: float,
+    previous: float,
+    fastest: float,
+    limits: DriveLimits,
+) -> float:
+    """Returns the sideways speed with which a holonomic base closes its distance to the path, m/s.
+
+    A base that does not go forward does not go sideways: it turns first, and sees where it goes.
+
+    Args:
+        p_WP: (k, 2) float64, k >= 1, metres in the world.
+        x: position of the base, metres.
+        y: position of the base, metres.
+        yaw: heading of the base, radians.
+        speed: forward command, m/s.
+        previous: previous sideways command, m/s.
+        fastest: m/s.
+        limits: limits of the base.
+    """
+    target = 0.0
+    if speed > 0.0:
+        segment, along, _ = project(p_WP, x, y)
+        near_x, near_y, _ = _advance(p_WP, segment, along, 0.0)
+        beside = math.cos(yaw) * (near_y - y) - math.sin(yaw) * (near_x - x)
+        fastest = min(fastest, 0.5 * speed)
+        target = min(max(LATERAL_GAIN * beside, -fastest), fastest)
+    return approach(previous, target, limits.max_acceleration * limits.period)
+
+
 def warm_up() -> None:
     """Compiles the kernels of this module and of the limits."""
     drive_limits.warm_up()
@@ -209,3 +272,5 @@ def warm_up() -> None:
     turn_rate(0.0, 0.0, 0.0, reaction, limits)
     p_WP = read_only(np.zeros((2, 2)))
     track_path(p_WP, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, reaction, limits)
+    back_off(0.0, 0.0, 0.0, limits)
+    lateral_speed(p_WP, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, limits)

@@ -109,12 +109,104 @@ def free_distance(
 
 
 @kernel
+def free_travel(
+    log_odds: NDArray[np.int8],
+    origin: tuple[float, float],
+    resolution: float,
+    pose: tuple[float, float, float],
+    twist: tuple[float, float, float],
+    horizon: float,
+    footprint: Footprint,
+    first: tuple[int, int] = (0, 0),
+) -> float:
+    """Returns the travel with a constant twist, sideways too, until a cell is met, metres.
+
+    What the base covers at the start is ignored, as in :func:`free_distance`; what lies within the
+    standoff at the start counts only if the base comes nearer.
+
+    Args:
+        log_odds: as in :func:`free_distance`, like what is not named here.
+        origin: world (x, y) of the corner of cell (0, 0), metres.
+        resolution: side of a cell, metres.
+        pose: x, y (metres) and yaw (radians) of the base.
+        twist: vx, vy (m/s) and wz (rad/s) in the base; not at rest.
+        horizon: metres.
+        footprint: of the base.
+        first: row and column of ``log_odds[0, 0]`` in the map.
+    """
+    x, y, yaw = pose
+    vx, vy, wz = twist
+    speed = math.hypot(vx, vy)
+    half_cell = resolution / 2.0
+    length, width = footprint.half_length + footprint.standoff, footprint.half_width + half_cell
+    reach = math.hypot(length, width) + horizon
+    c, s = math.cos(yaw), math.sin(yaw)
+    # No corner moves more than a quarter of a cell in a step.
+    step = resolution / 4.0 / (1.0 + abs(wz) * math.hypot(length, width) / speed)
+    best = horizon
+    rows, columns = log_odds.shape
+    for row in range(rows):
+        for column in range(columns):
+            if log_odds[row, column] <= 0:
+                continue
+            dx = origin[0] + (column + first[1] + 0.5) * resolution - x
+            dy = origin[1] + (row + first[0] + 0.5) * resolution - y
+            if dx * dx + dy * dy > reach * reach:
+                continue
+            px, py = c * dx + s * dy, c * dy - s * dx
+            if abs(px) < length and abs(py) < width:
+                inside = abs(px) < footprint.half_length
+                if not inside and vx * px > 0.0:
+                    return 0.0
+                continue
+            travel = step
+            while travel < best:
+                time = travel / speed
+                turned = wz * time
+                # The chord of the arc points half the turn aside.
+                cm, sm = math.cos(turned / 2.0), math.sin(turned / 2.0)
+                chord = time if abs(turned) < 1e-6 else time * sm / (turned / 2.0)
+                qx = px - (cm * vx - sm * vy) * chord
+                qy = py - (sm * vx + cm * vy) * chord
+                ct, st = math.cos(turned), math.sin(turned)
+                if abs(ct * qx + st * qy) < length and abs(ct * qy - st * qx) < width:
+                    best = travel - step
+                    break
+                travel += step
+    return best
+
+
+@kernel
 def stoppable_speed(free: float, deceleration: float, period: float) -> float:
     """Returns the largest v with v^2 / (2 deceleration) + period v <= free; 0 when free <= 0."""
     if free <= 0.0:
         return 0.0
     step = deceleration * period
     return math.sqrt(step * step + 2.0 * deceleration * free) - step
+
+
+@kernel
+def stoppable_speed_from(previous: float, free: float, deceleration: float, period: float) -> float:
+    """Returns the largest next speed of a body that slows down by itself, as fast as it can.
+
+    A body told to go slower than ``previous`` still covers (previous - v)^2 / (2 deceleration)
+    more than ``period v``; that counts too.
+
+    Args:
+        previous: speed told before, m/s, not negative.
+        free: metres ahead.
+        deceleration: of the body, m/s^2.
+        period: for which it holds what it is told, seconds.
+    """
+    faster = stoppable_speed(free, deceleration, period)
+    if faster >= previous:
+        return faster
+    linear = period - previous / deceleration
+    over = free - previous * previous / (2.0 * deceleration)
+    root = linear * linear + 4.0 * over / deceleration
+    if root <= 0.0:
+        return 0.0
+    return min(max(0.5 * deceleration * (math.sqrt(root) - linear), 0.0), previous)
 
 
 def warm_up() -> None:
@@ -134,3 +226,14 @@ def warm_up() -> None:
         (0, 0),
     )
     stoppable_speed(1.0, 1.0, 1.0)
+    free_travel(
+        read_only(np.zeros((1, 1), np.int8)),
+        (0.0, 0.0),
+        1.0,
+        (0.0, 0.0, 0.0),
+        (1.0, 0.0, 0.0),
+        1.0,
+        Footprint(),
+        (0, 0),
+    )
+    stoppable_speed_from(1.0, 1.0, 1.0, 1.0)

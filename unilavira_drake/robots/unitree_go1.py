@@ -21,8 +21,8 @@ class UnitreeGo1(GroundRobot):
     max_yaw_acceleration: float = 3.0
     length: float = 0.65
     width: float = 0.30
-    radius: float = 0.28
-    turning_radius: float = 0.38
+    radius: float = 0.17
+    turning_radius: float = 0.37
     image_width: int = 640
     image_height: int = 480
     horizontal_fov_degrees: float = 90.0

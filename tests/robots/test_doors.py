@@ -1,0 +1,49 @@
+"""A few of the drives of the robots' benchmark, through doors little wider than the robot."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from unilavira_drake.scenario import robot_kinds
+
+PATH = Path(__file__).resolve().parents[2] / "benchmarks" / "drives.py"
+
+
+@pytest.fixture(scope="module")
+def drives() -> Any:
+    spec = importlib.util.spec_from_file_location("door_drives", PATH)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", ["cobot_magic", "unitree_go1", "unitree_g1"])
+@pytest.mark.parametrize("seed", [1, 3])
+def test_it_drives_through_a_narrow_door(drives: Any, name: str, seed: int) -> None:
+    drive = drives.seeded_drive(robot_kinds()[name](), seed)
+    assert (drive.state, drive.reason) == ("arrived", "")
+    assert drive.penetration < 0.01
+    assert not drive.crossed
+    assert np.percentile(drive.errors, 95) < 0.10
+
+
+def test_a_stuck_robot_backs_off_and_gets_through(drives: Any) -> None:
+    drive = drives.seeded_drive(robot_kinds()["cobot_magic"](), 9)
+    assert drive.state == "arrived"
+    assert drive.contact > 1.0  # It touches the frame, backs off, and tries again.
+
+
+def test_a_wall_without_a_door_is_told(drives: Any) -> None:
+    robot = robot_kinds()["unitree_g1"]()
+    drive = drives.drive(robot, start=(-2.0, 0.0, 0.0), goal=(2.0, 0.0), door=0.0, width=0.3)
+    assert drive.state == "failed"
+    assert not drive.crossed
