@@ -27,6 +27,8 @@ _NEAR_PLACE = 80.0
 _PROMISE = 8.0
 """What each landmark in a view is worth to the search, metres of free distance."""
 _FAILED = 50.0
+_OFF_WAY = 0.4
+"""What a degree off the direction to the stated place speaks against a thing, metres."""
 _SIDES = {"left": 90.0, "right": -90.0, "around": 180.0}
 
 
@@ -111,6 +113,7 @@ def _chosen(
     One that was flown to in vain from here comes later; a thing straight below is no way along.
     """
     found = []
+    goal = situation.stated()
     for i, sight in enumerate(situation.scene.matching(leg)):
         if ahead and sight.direction == DOWN:
             continue
@@ -121,6 +124,8 @@ def _chosen(
             cost += 0.5 * abs(sight.bearing)
         if leg.side and math.copysign(1.0, sight.bearing) != (1 if leg.side == "left" else -1):
             cost += 10.0
+        if goal is not None:
+            cost += _OFF_WAY * _apart(sight.bearing, goal[1])
         cost += situation.tried(sight.direction)
         if situation.tried(sight.direction) >= 2 * _FAILED:
             continue

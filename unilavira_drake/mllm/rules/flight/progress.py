@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 from unilavira_drake.messages import DOWN
 from unilavira_drake.mllm.rules.flight.legs import Leg
-from unilavira_drake.mllm.rules.flight.situation import LEVEL, FlightSituation, FlightStep
+from unilavira_drake.mllm.rules.flight.situation import FAILED, LEVEL, FlightSituation, FlightStep
 
 NEAR_GOAL = 45.0
 """So near to a stated place what was on the way to it no longer matters, metres."""
 NEXT = 40.0
 """So near to the next landmark the one before it no longer matters, metres."""
-FAILED = 60.0
-"""What a failed move in a direction counts, metres."""
 ARRIVED = 20.0
 """So near to a stated place the search for the landmark itself begins, metres."""
 

@@ -7,14 +7,18 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from unilavira_drake.messages import ON_THE_WAY, TodoItem
+from unilavira_drake.messages import DOWN, ON_THE_WAY, TodoItem
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, WaypointNote
 from unilavira_drake.mllm.rules.flight.legs import Leg
 from unilavira_drake.mllm.rules.flight.parser import parse_directive, plan_legs
 from unilavira_drake.mllm.rules.flight.scene import AirScene, LandmarkSight, look_around
 
-REACH = 12.0
-"""A landmark this near, through the air, is reached, metres."""
+REACH = 8.0
+"""A landmark below or beside is reached from this height over it, metres."""
+FAR_REACH = 14.0
+"""The same where it cannot be come nearer, metres."""
+FAILED = 60.0
+"""What a failed move in a direction counts, metres."""
 BESIDE_REACH = 9.0
 """One that stands as high as the aircraft: along the ground, metres."""
 PASSING = 25.0
@@ -76,7 +80,9 @@ class FlightSituation:
             elif leg.kind in ("past", "go"):
                 there = sight.below or sight.distance <= PASSING
             else:
-                there = sight.away <= REACH and (sight.distance <= BESIDE_REACH or sight.below)
+                reach = FAR_REACH if self.tried(DOWN) >= FAILED else REACH
+                beside = sight.below or sight.distance <= BESIDE_REACH
+                there = beside and abs(sight.drop) <= reach
             if there:
                 return sight
         return None
@@ -86,7 +92,7 @@ class FlightSituation:
         texts = self.here.tried if self.here else ()
         own = [text for text in texts if text.startswith(f"{direction}: ")]
         failures = sum(text.startswith(f"{direction}: failed") for text in own)
-        return 60.0 * failures + 15.0 * (len(own) - failures)
+        return FAILED * failures + 15.0 * (len(own) - failures)
 
     def stated(self) -> tuple[float, float] | None:
         """Returns (metres, degrees to the left) to the place that the plan states, from here."""
