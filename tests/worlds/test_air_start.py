@@ -74,5 +74,5 @@ def test_bad_starts_name_value_and_remedy(town, text, message):
 
 
 def test_rooms_have_no_starts_in_the_air():
-    with pytest.raises(TaskError, match="is not X,Y,YAW"):
+    with pytest.raises(TaskError, match="no floor lies at height 1"):
         parse_start_pose("2.9,7.4,1.0,0.0", load_world("flat"), radius=0.36)
