@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageDepth32F
 
-from unilavira_drake.mapping.depth_scan import warm_up
+from unilavira_drake.mapping.depth_scan import FREE_STEP, warm_up
 from unilavira_drake.mapping.depth_view import DepthView
 from unilavira_drake.mapping.occupancy import NEWEST, MappingParameters, integrate
 from unilavira_drake.mapping.stair_corridor import StairCorridor, corridor_at
@@ -32,6 +32,11 @@ from unilavira_drake.ports import (
     pose_input,
     pose_matrix,
 )
+
+OLDEST_VIEW = 0.5
+"""Where things move, older views of a panorama are not integrated, seconds."""
+MOVING_FREE_STEP = 10
+"""There a thing in a place that was never seen free is forgotten after so few looks."""
 
 
 @dc.dataclass(frozen=True)
@@ -116,9 +121,13 @@ class OccupancyMapper(Level):
             max_height=max_height,
             footprint_radius=footprint_radius,
             stride=stride,
+            free_step=MOVING_FREE_STEP if moving else FREE_STEP,
             newest=NEWEST if moving else 0,
             saturation=saturation,
         )
+        # Where things move, a view of the past would put them back; what it showed of the rest was
+        # integrated while the robot turned.
+        self._oldest = OLDEST_VIEW if moving else math.inf
         self._travel = travel
         self._turn = turn
         self._rest_period = rest_period
@@ -141,7 +150,8 @@ class OccupancyMapper(Level):
         panorama = self._panorama(context)
         X_WB = pose_matrix(self._pose(context))
         if panorama.first > state.occupancy.n:
-            views = tuple(DepthView.of(frame) for frame in panorama.frames)
+            oldest = context.get_time() - self._oldest
+            views = tuple(DepthView.of(f) for f in panorama.frames if f.time >= oldest)
             return self._integrated(context, state, X_WB, panorama.X_WB, views, panorama.n)
         if panorama.n > state.occupancy.n:
             occupancy = dc.replace(state.occupancy, n=panorama.n)

@@ -46,3 +46,8 @@ class PeopleConfig:
     # Whether the prompt says who is where and moves how: the simulator's labels tell it, so the
     # result then says perception ground_truth.
     in_prompt: bool = False
+
+
+def tells_of_people(config: PeopleConfig) -> bool:
+    """Whether prompts say who is where and moves how."""
+    return config.count > 0 and config.in_prompt

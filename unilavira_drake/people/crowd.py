@@ -62,8 +62,10 @@ def person_names(config: PeopleConfig) -> tuple[str, ...]:
 
 
 def with_people(world: World, config: PeopleConfig) -> World:
-    """Returns the world with the labels of its people; the same world where there are none."""
-    if config.count == 0:
+    """Returns the world with the labels of its people; the same world where there are none
+    or it has them.
+    """
+    if config.count == 0 or world.label_of(person_names(config)[0]) is not None:
         return world
     first = max(world.labels) + 1
     labels = {first + k: LabelEntry("person", name) for k, name in enumerate(person_names(config))}
