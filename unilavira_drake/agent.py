@@ -54,6 +54,7 @@ def make_agent(
     detector: Callable[[Frame], ViewEvidence],
     prompt_preset: str = "compact",
     grounder: str = "none",
+    people: bool = False,
     replace: MutableMapping[str, System] | None = None,
 ) -> Diagram:
     """Returns the agent; it is the same for every robot.
@@ -63,7 +64,7 @@ def make_agent(
     detector reaches a level only when its model declares ``perception: ground_truth``. Targets
     beyond ``max_range`` (metres) are refused. ``prompt_preset`` is a key of ``PROMPT_PRESETS``.
     ``grounder`` is ``none``, ``color`` or ``label`` (which reads the detector); a ``grounder`` in
-    ``replace`` is wired in any case.
+    ``replace`` is wired in any case. ``people``: its prompts say who is where and moves how.
     """
     wiring = Wiring(replace)
     preset = PROMPT_PRESETS[prompt_preset]
@@ -144,6 +145,8 @@ def make_agent(
     wiring.connect(marker, "vision_action", "goal_selector")
     wiring.connect("waypoint_memory", "history", "goal_selector")
     _border(wiring)
+    if people:
+        wiring.take_input("people", "language")
     if marker != "vision":
         wiring.take_input("panorama", marker)
     return wiring.build("agent")

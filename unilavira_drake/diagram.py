@@ -16,8 +16,10 @@ from unilavira_drake.messages import Frame
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.model_pair import ModelPair, make_models
 from unilavira_drake.navigation import make_navigation
-from unilavira_drake.people.adding import mapping_among, planning_among
-from unilavira_drake.people.crowd import with_people
+from unilavira_drake.people.adding import mapping_among, oldest_panorama, planning_among
+from unilavira_drake.people.config import tells_of_people
+from unilavira_drake.people.crowd import detected_labels, make_crowd, with_people
+from unilavira_drake.people.tracker import PeopleTracker
 from unilavira_drake.recording.recorder import Recorder
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.sensors.detections import GroundTruthDetector
@@ -29,6 +31,7 @@ from unilavira_drake.task_choice import choose_task
 from unilavira_drake.wiring import Wiring
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.start import parse_start_pose
+from unilavira_drake.worlds.world import World
 
 FRAMES_KEPT = 16
 """Frames whose detections are remembered; a panorama re-issued under a new number costs none."""
@@ -90,6 +93,7 @@ def make_navigation_diagram(
             period=scenario.tick,
             views=scenario.robot.views,
             sweep_direction=scenario.robot.sweep_direction,
+            max_age=oldest_panorama(scenario.people),
         ),
     )
     wiring.add(
@@ -114,6 +118,7 @@ def make_navigation_diagram(
             ),
             prompt_preset=scenario.prompt_preset,
             grounder=scenario.grounder,
+            people=tells_of_people(scenario.people),
             replace=own,
         ),
     )
@@ -127,6 +132,7 @@ def make_navigation_diagram(
             tick=scenario.tick,
             time_step=scenario.plant.time_step,
             replace=own,
+            moving_labels=detected_labels(world, scenario.people),
         ),
     )
     wiring.add(
@@ -138,17 +144,22 @@ def make_navigation_diagram(
     _close_the_ring(wiring, scenario.robot.views)
     if scenario.people.count:
         wiring.connect("station", "cheat_people", "episode_monitor")
+    if detected_labels(world, scenario.people):
+        wiring.connect("station", "front.label_image", "navigation")
+    if tells_of_people(scenario.people):
+        _track_people(wiring, scenario, world, (x, y))
     if on_message is not None:
         wiring.add(
             "recorder", lambda: Recorder(on_message, period=scenario.tick, grounder=grounder)
         )
         _listen(wiring, todo=scenario.ablation in ("full", "no_scb"), grounder=grounder)
     if own:
-        levels = (*_TOP_LEVELS, "locomotion", *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
+        levels = (*_TOP_LEVELS, *_PEOPLE_LEVELS, "locomotion", *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
         raise ScenarioError(unknown_name("level", next(iter(own)), levels, "replace"))
     return wiring.build("unilavira")
 
 
+_PEOPLE_LEVELS = ("people_tracker",)
 _TOP_LEVELS = ("task", "station", "observer", "agent", "navigation", "episode_monitor", "recorder")
 _AGENT_LEVELS = (
     "language",
@@ -192,6 +203,27 @@ def _close_the_ring(wiring: Wiring, views: Sequence[str]) -> None:
     for role in ("language", "vision"):
         wiring.connect("agent", f"{role}_usage", "episode_monitor")
         wiring.connect_wanted("agent", f"{role}_awaited", "navigation")
+
+
+def _track_people(
+    wiring: Wiring, scenario: Scenario, world: World, start: tuple[float, float]
+) -> None:
+    """Adds the level that tells the agent of people, from the simulator's labels."""
+    robot = scenario.robot
+    crowd = make_crowd(scenario.people, world, seed=scenario.random_seed, robot=start)
+    wiring.add(
+        "people_tracker",
+        lambda: PeopleTracker(
+            clothes={person.label: person.color for person in crowd},
+            intrinsics=front_intrinsics(robot),
+            views=robot.views,
+        ),
+    )
+    for view in robot.views:
+        for port in ("depth_image", "label_image", "X_BC"):
+            wiring.connect("station", f"{view}.{port}", "people_tracker")
+    wiring.connect("station", "pose_estimate", "people_tracker")
+    wiring.connect("people_tracker", "people", "agent")
 
 
 def _listen(wiring: Wiring, *, todo: bool, grounder: bool) -> None:

@@ -9,6 +9,7 @@ from unilavira_drake.evaluation.scoring import Score
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.model_pair import ModelPair
+from unilavira_drake.people.config import reads_labels
 from unilavira_drake.recording.result import (
     EpisodeResult,
     JudgeResult,
@@ -50,7 +51,7 @@ def episode_result(
         robot=scenario.robot.name,
         ablation=scenario.ablation,
         seed=scenario.random_seed,
-        model=_model(models, scenario.grounder),
+        model=_model(models, scenario),
         metrics=MetricsResult(
             navigation_error_m=verdict.navigation_error_m,
             path_length_m=round(verdict.path_length_m, 4),
@@ -90,11 +91,11 @@ def _judge_error(judgement: Judgement | None) -> str:
     return f"judge_model: {judgement.error}" if judgement is not None and judgement.error else ""
 
 
-def _model(models: ModelPair, grounder: str) -> ModelResult:
+def _model(models: ModelPair, scenario: Scenario) -> ModelResult:
     language, vision = models.language.backend, models.vision.backend
     # The weaker claim stands for the pair: one level on ground truth taints the whole result.
     perceptions = {language.perception, vision.perception}
-    if grounder == "label":
+    if scenario.grounder == "label" or reads_labels(scenario.people):
         perceptions.add("ground_truth")
     return ModelResult(
         language=language.name,

@@ -62,6 +62,22 @@ def test_who_comes_head_on_in_the_corridor_turns_back_in_the_end():
     assert (log.state, log.touched) == ("arrived", False)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_three_people_and_the_robot_pass_each_other(seed):
+    # Speeds and rests are drawn; two cross the corridor and one walks along it.
+    people = {
+        "count": 3,
+        "seed": seed,
+        "routes": [
+            {"waypoints": ["kitchen", "bathroom"]},
+            {"waypoints": ["study", "living_room"]},
+            {"waypoints": ["13.5,6.0", "8.0,5.4"]},
+        ],
+    }
+    log = Drive(**ALONG, people=people).run(90.0)
+    assert (log.state, log.touched) == ("arrived", False)
+
+
 def test_impolite_people_push_and_are_felt():
     # The robot stands; its goal is where it is.
     people = {

@@ -22,6 +22,7 @@ from unilavira_drake.messages import (
     TodoList,
     TodoUpdate,
 )
+from unilavira_drake.messages.people import PeopleTracks
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.reply import MllmReply
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
@@ -57,6 +58,7 @@ class Language(Level):
         - second_chance (optional: unconnected = no Second Chance Backtrack)
         - todo_list (optional: unconnected = no TODO List Memory)
         - model_reply
+        - people (optional)
         output_ports:
         - language_action
         - model_request
@@ -94,6 +96,7 @@ class Language(Level):
         self._history = message_input(self, "history", History())
         self._second_chance = message_input(self, "second_chance", SecondChance())
         self._todo_list = message_input(self, "todo_list", TodoList())
+        self._people = message_input(self, "people", PeopleTracks())
         self._reply = message_input(self, "model_reply", MllmReply())
         self.declare_output("language_action", lambda state: state.action, LanguageAction())
         self.declare_output("model_request", lambda state: state.request, MllmRequest())
@@ -142,6 +145,8 @@ class Language(Level):
             detector=self._detector,
             view_detail=self._view_detail,
             history_detail=self._history_detail,
+            people=self._people.optional(context),
+            time=context.get_time(),
         )
         return dataclasses.replace(state, request=request)
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from unilavira_drake.language.bearings import direction_note
+from unilavira_drake.language.people_notes import people_in_view
 from unilavira_drake.messages import (
     DecisionRecord,
     Edge,
@@ -22,6 +23,7 @@ from unilavira_drake.messages import (
     Waypoint,
     direction_of,
 )
+from unilavira_drake.messages.people import PeopleTracks
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.mllm.request import (
     OTHER_FLOOR,
@@ -54,13 +56,16 @@ def language_request(
     detector: Callable[[Frame], ViewEvidence] | None,
     view_detail: str = "medium",
     history_detail: str = "low",
+    people: PeopleTracks | None = None,
+    time: float = 0.0,
 ) -> MllmRequest:
     """Returns the first attempt of call ``panorama.n``.
 
     ``second_chance`` and ``todo`` are None when SCB and TDM are not wired.  The detector's
     evidence is added only when one is given, that is for a model declared ``ground_truth``.
-    Its images are the pictures of the past, oldest first, those of a failed leg that the history
-    no longer shows, and the views; no picture is sent twice.
+    ``people`` are told of beside the views, as they were seen up to ``time``; None where nobody is
+    looked for.  Its images are the pictures of the past, oldest first, those of a failed leg that
+    the history no longer shows, and the views; no picture is sent twice.
     """
     failed_frames = () if second_chance is None else second_chance.failed_frames
     rejected = last_action.call == "double_check" and last_action.confirmed is False
@@ -68,9 +73,14 @@ def language_request(
         family=task.family,
         task=task.text,
         views=tuple(
-            ViewNote(direction, round(free_distance(_over_floor(panorama, direction)), 2))
+            ViewNote(
+                direction,
+                round(free_distance(_over_floor(panorama, direction)), 2),
+                () if people is None else people_in_view(people, panorama, direction, time),
+            )
             for direction in panorama.directions
         ),
+        people=people is not None,
         last_action=_last_action(last_action, history),
         outcome=panorama.outcome.words if last_action.n else "",
         rejection=last_action.reason if rejected else "",

@@ -38,3 +38,26 @@ class PeopleTruth(Message):
     def touched(self) -> bool:
         """Whether the robot touches anybody."""
         return any(person.touched for person in self.people)
+
+
+@dataclass(frozen=True)
+class PersonTrack(Message):
+    """What was made of the latest pictures of one person."""
+
+    label: int = 0
+    """Tells people apart, and nothing else."""
+    color: str = ""
+    """Colour word of the clothes."""
+    position: tuple[float, float] = (0.0, 0.0)
+    """In the world, metres."""
+    velocity: tuple[float, float] | None = None
+    """Metres a second in the world; None after a single look."""
+    time: float = 0.0
+    """Of the latest look, seconds."""
+
+
+@dataclass(frozen=True)
+class PeopleTracks(Message):
+    """The people that were seen lately, in the order of their labels."""
+
+    tracks: tuple[PersonTrack, ...] = ()

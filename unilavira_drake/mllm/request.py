@@ -25,6 +25,8 @@ class ViewNote(Message):
     direction: str = "front"
     free_distance: float = 0.0
     """Measured free distance along the view's axis, metres."""
+    people: tuple[str, ...] = ()
+    """Who is there and moves how, e.g. ``person in blue, 2.1 m, walking towards you``."""
 
 
 OTHER_FLOOR = "on another floor: "
@@ -119,6 +121,8 @@ class LanguageVariables(Message):
     """Numbers of the waypoints that the buffer had no room for any more."""
     in_flight: bool = False
     """Whether the robot flies: there is a view straight down."""
+    people: bool = False
+    """Whether people are told of beside the views."""
     bearings: DirectionNote | None = None
     """In flight, where vision could not ground the last view: what to reason on instead."""
 

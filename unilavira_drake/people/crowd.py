@@ -61,9 +61,18 @@ def person_names(config: PeopleConfig) -> tuple[str, ...]:
     return tuple(f"person_{k}" for k in range(1, config.count + 1))
 
 
+def detected_labels(world: World, config: PeopleConfig) -> tuple[int, ...]:
+    """Returns the labels of people that the mapper is told of."""
+    names = person_names(config) if config.detected else ()
+    labels = (world.label_of(name) for name in names)
+    return tuple(label for label in labels if label is not None)
+
+
 def with_people(world: World, config: PeopleConfig) -> World:
-    """Returns the world with the labels of its people; the same world where there are none."""
-    if config.count == 0:
+    """Returns the world with the labels of its people; the same world where there are none
+    or it has them.
+    """
+    if config.count == 0 or world.label_of(person_names(config)[0]) is not None:
         return world
     first = max(world.labels) + 1
     labels = {first + k: LabelEntry("person", name) for k, name in enumerate(person_names(config))}

@@ -91,6 +91,8 @@ class Observer(Level):
         rest_rate: ... and below this yaw rate (rad/s) and speed (m/s) ...
         view_deadline: ... or after this many seconds, at whatever heading was reached; the
             frame's pose is the true geometry, so a blocked turn costs coverage, not truth.
+        max_age: after a failure a panorama that is older is captured anew though the robot has not
+            moved, seconds; for places where people walk.
     """
 
     def __init__(
@@ -103,6 +105,7 @@ class Observer(Level):
         heading_tolerance: float = 0.02,
         rest_rate: float = 0.03,
         view_deadline: float = 8.0,
+        max_age: float = math.inf,
     ) -> None:
         super().__init__(ObserverState(), period=period)
         self._intrinsics = intrinsics
@@ -120,6 +123,7 @@ class Observer(Level):
         self._heading_tolerance = heading_tolerance
         self._rest_rate = rest_rate
         self._view_deadline = view_deadline
+        self._max_age = max_age
         self._cameras = {view: _CameraPorts(self, view) for view in (*ring, *extra)}
         self._pose = pose_input(self, "pose_estimate")
         self._twist = vector_input(self, "twist", 6)
@@ -145,8 +149,12 @@ class Observer(Level):
         outcome = Outcome(status.state, status.reason, status.remaining)
         heading = yaw if status.heading is None else status.heading
         if state.panorama.n > 0 and _at_rest_place(state, X_WB, yaw, status.heading):
-            panorama = dataclasses.replace(state.panorama, n=n, outcome=outcome)
-            return dataclasses.replace(state, panorama=panorama)
+            age = context.get_time() - state.panorama.time
+            if status.state != "failed" or age <= self._max_age:
+                panorama = dataclasses.replace(state.panorama, n=n, outcome=outcome)
+                return dataclasses.replace(state, panorama=panorama)
+            # What was in the way may be gone; the four words keep their meaning.
+            heading = state.panorama.yaw if status.heading is None else heading
         # A ring that faces anywhere need not turn.
         turns = len(self._stops) > 1 or status.heading is not None
         return dataclasses.replace(
