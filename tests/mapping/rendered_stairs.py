@@ -46,12 +46,13 @@ def frames(world: World, places: list[Place], height: float) -> list[Frame]:
             builder,
             plant,
             scene_graph,
-            frame_name=f"camera_{index}",
+            name=f"camera_{index}",
+            frame_names={"front": f"camera_{index}"},
             intrinsics=LENS,
             min_depth=0.1,
             max_depth=10.0,
             lights=lights(mirrored=world.mirrored),
-        )[0]
+        )
         for index in range(len(places))
     ]
     diagram = builder.Build()
