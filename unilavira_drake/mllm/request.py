@@ -119,6 +119,8 @@ class LanguageVariables(Message):
     """Numbers of the waypoints that the buffer had no room for any more."""
     in_flight: bool = False
     """Whether the robot flies: there is a view straight down."""
+    compass: float = 0.0
+    """In flight: degrees from north, clockwise, to which ``front`` looks; north is the world's y."""
     bearings: DirectionNote | None = None
     """In flight, where vision could not ground the last view: what to reason on instead."""
 
