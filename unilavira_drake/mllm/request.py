@@ -120,7 +120,7 @@ class LanguageVariables(Message):
     in_flight: bool = False
     """Whether the robot flies: there is a view straight down."""
     compass: float = 0.0
-    """In flight: degrees from north, clockwise, to which ``front`` looks; north is the world's y."""
+    """In flight: where ``front`` looks, degrees clockwise from north, which is the world's y."""
     bearings: DirectionNote | None = None
     """In flight, where vision could not ground the last view: what to reason on instead."""
 
