@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from unilavira_drake.language.reply import parse_language_reply
-from unilavira_drake.messages import CALLS, TodoItem
+from unilavira_drake.messages import CALLS, DIRECTIONS, DOWN, TodoItem
 from unilavira_drake.mllm.boxes import BOX_SPACES
 from unilavira_drake.mllm.reply_schema import (
     gemini_schema,
@@ -21,6 +21,7 @@ from unilavira_drake.mllm.reply_schema import (
     schema_prompt,
 )
 from unilavira_drake.mllm.request import (
+    DirectionNote,
     FreeVariables,
     ImagePart,
     LanguageVariables,
@@ -71,6 +72,11 @@ REQUESTS = {
     "no_list": changed(todo=None),
     "no_way_back": changed(waypoints=()),
     "no_second_chance": changed(second_chance=False),
+    "in_flight": changed(in_flight=True),
+    "by_numbers": changed(in_flight=True, bearings=DirectionNote()),
+    "down_failed": changed(
+        dataclasses.replace(DECIDE, call="recover"), in_flight=True, failed_direction="down"
+    ),
     **{space: ground(space) for space in BOX_SPACES},
 }
 
@@ -230,3 +236,15 @@ def test_the_sentence_holds_the_whole_schema() -> None:
     schema = request_schema(DECIDE)
     assert schema is not None
     assert json.loads(schema_prompt(schema).strip().splitlines()[-1]) == openai_schema(schema)
+
+
+def test_down_and_flights_by_numbers_are_offered_in_flight_alone() -> None:
+    ground, aloft = (tools(changed(in_flight=value)) for value in (False, True))
+    assert ground["turn"]["direction"]["enum"] == list(DIRECTIONS)
+    assert "climb" not in ground["turn"]
+    assert aloft["turn"]["direction"]["enum"] == [*DIRECTIONS, DOWN]
+    assert "fly" not in aloft
+    by_numbers = tools(REQUESTS["by_numbers"])
+    assert set(by_numbers["fly"]) == {"tool", "bearing", "distance", "climb"}
+    down_failed = tools(REQUESTS["down_failed"])
+    assert down_failed["turn"]["direction"]["enum"] == list(DIRECTIONS)

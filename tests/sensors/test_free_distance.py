@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from unilavira_drake.messages import Frame
-from unilavira_drake.sensors.free_distance import free_distance
+from unilavira_drake.sensors.free_distance import axial_distance, free_distance
 from unilavira_drake.sensors.rig import pinhole
 
 HEIGHT = 1.0
@@ -91,3 +91,22 @@ def test_a_camera_that_looks_straight_down_says_nothing_is_ahead():
     X_WC = np.eye(4)
     X_WC[:3, :3] = np.diag([1.0, -1.0, -1.0])
     assert free(Frame(X_WC=X_WC)) == 10.0
+
+
+@pytest.mark.parametrize("width", [160, 640])
+@pytest.mark.parametrize("distance", [0.8, 7.0, 12.0, 39.0])
+def test_along_an_aircrafts_axis_a_wall_is_as_far_as_it_is(width, distance):
+    k = pinhole(width, width * 3 // 4, 90.0)
+    frame = Frame(depth=np.full((k.height, k.width), distance, np.float32), intrinsics=k)
+    assert axial_distance(frame, max_range=40.0) == pytest.approx(distance, abs=0.011)
+
+
+def test_beside_the_axis_nothing_is_in_an_aircrafts_way():
+    k = pinhole(160, 120, 90.0)
+    depth = np.full((k.height, k.width), np.inf, np.float32)
+    depth[:, 90:] = 5.0  # from 0.65 m to the right of the axis on
+    depth[0, :] = 0.0
+    frame = Frame(depth=depth, intrinsics=k)
+    assert axial_distance(frame, max_range=40.0) == 40.0
+    depth[:, 80:] = 5.0
+    assert axial_distance(Frame(depth=depth, intrinsics=k), max_range=40.0) == pytest.approx(5.0)

@@ -168,8 +168,10 @@ def _decision(
         _check_turn(action, request.call, variables)
     elif isinstance(action, Backtrack):
         _check_backtrack(action, variables)
-    elif isinstance(action, Fly):
-        _check_fly(action, variables)
+    elif isinstance(action, Fly) and variables.bearings is None:
+        raise ReplyFormatError(
+            "fly is offered only where nothing could be marked in the last view; use turn."
+        )
     elif isinstance(action, GoStair) and not variables.can_climb:
         raise ReplyFormatError(
             "this robot cannot climb; go_stair is not offered, use another tool."
@@ -207,15 +209,6 @@ def _check_turn(action: Turn | FlightTurn, call: str, variables: LanguageVariabl
         raise ReplyFormatError(
             f"{failed} is the direction that has just failed from here; choose among {remaining}."
         )
-
-
-def _check_fly(action: Fly, variables: LanguageVariables) -> None:
-    if variables.bearings is None:
-        raise ReplyFormatError(
-            "fly is offered only where nothing could be marked in the last view; use turn."
-        )
-    if not action.distance and not action.climb:
-        raise ReplyFormatError("fly with distance 0 and climb 0 goes nowhere; give one of them.")
 
 
 def _check_backtrack(action: Backtrack, variables: LanguageVariables) -> None:

@@ -100,6 +100,7 @@ def language_request(
         choices=task.choices,
         forgotten=_forgotten(history),
         in_flight=panorama.in_flight,
+        compass=round(90.0 - math.degrees(panorama.yaw)) % 360.0 if panorama.in_flight else 0.0,
         bearings=direction_note(task.text, last_action, panorama, history)
         if call in ("decide", "recover")
         else None,

@@ -133,7 +133,12 @@ def _environment() -> jinja2.Environment:
         autoescape=False,
     )
     environment.filters.update(
-        quote=_quote, line=_line, picture=_picture, metres=_metres, bearing=_bearing
+        quote=_quote,
+        line=_line,
+        picture=_picture,
+        metres=_metres,
+        bearing=_bearing,
+        compass=_compass,
     )
     return environment
 
@@ -172,3 +177,18 @@ def _bearing(degrees: float) -> str:
     if abs(angle) == 180:
         return "straight to the back"
     return f"{abs(angle)} degrees to the {'left' if angle > 0 else 'right'}"
+
+
+def _compass(degrees: float) -> str:
+    """Returns an angle from north, clockwise, in words."""
+    points = [
+        "north",
+        "north-east",
+        "east",
+        "south-east",
+        "south",
+        "south-west",
+        "west",
+        "north-west",
+    ]
+    return f"{points[round(degrees / 45.0) % 8]} ({degrees % 360.0:.0f} degrees by the compass)"

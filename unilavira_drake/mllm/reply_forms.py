@@ -10,13 +10,16 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 
-from unilavira_drake.mllm.reply_model import Mark, Number, ReplyModel, Share, Whole
-
-MAX_FLIGHT = 100.0
-"""Longest way, and highest climb, that a reply may ask for in one move, metres."""
-
-Climb = Annotated[Number, pydantic.Field(ge=-MAX_FLIGHT, le=MAX_FLIGHT)]
-"""Metres to end higher (below zero: lower) than now."""
+from unilavira_drake.mllm.reply_model import (
+    Bearing,
+    Climb,
+    Distance,
+    Mark,
+    Number,
+    ReplyModel,
+    Share,
+    Whole,
+)
 
 
 class UpdateOp(ReplyModel):
@@ -71,8 +74,8 @@ class Fly(ReplyModel):
     """Fly by numbers, where vision could not ground a view (paper V)."""
 
     tool: Literal["fly"]
-    bearing: Annotated[Number, pydantic.Field(ge=-180.0, le=180.0)]
-    distance: Annotated[Number, pydantic.Field(ge=0.0, le=MAX_FLIGHT)]
+    bearing: Bearing
+    distance: Distance
     climb: Climb
 
 

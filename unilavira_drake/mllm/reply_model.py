@@ -45,6 +45,18 @@ Share = Annotated[
 """A number from 0 to 1, also when it is given as text."""
 Mark = Annotated[int, pydantic.Field(ge=1, le=5), pydantic.BeforeValidator(_whole_from_text)]
 """A whole number from 1 to 5, also when it is given as text."""
+Bearing = Annotated[
+    float, pydantic.Field(ge=-180.0, le=180.0), pydantic.BeforeValidator(_decimal_from_text)
+]
+"""Degrees to the left of the front, also when they are given as text."""
+Distance = Annotated[
+    float, pydantic.Field(ge=0.0, le=100.0), pydantic.BeforeValidator(_decimal_from_text)
+]
+"""Metres along the ground in one move, also when they are given as text."""
+Climb = Annotated[
+    float, pydantic.Field(ge=-100.0, le=100.0), pydantic.BeforeValidator(_decimal_from_text)
+]
+"""Metres to end higher (below zero: lower) than now, also when they are given as text."""
 
 
 class ReplyModel(pydantic.BaseModel):

@@ -123,6 +123,8 @@ class LanguageVariables(Message):
     """Whether the robot flies: there is a view straight down."""
     people: bool = False
     """Whether people are told of beside the views."""
+    compass: float = 0.0
+    """In flight: where ``front`` looks, degrees clockwise from north, which is the world's y."""
     bearings: DirectionNote | None = None
     """In flight, where vision could not ground the last view: what to reason on instead."""
 
