@@ -132,9 +132,7 @@ def make_navigation_station(
         light = lights(mirrored=world.mirrored)
         colors = add_raster_cameras(builder, plant, scene_graph, robot, light)
     else:
-        colors = add_scene_cameras(
-            builder, plant, _picture_scene(scenario, world, people), robot
-        )
+        colors = add_scene_cameras(builder, plant, _picture_scene(scenario, world, people), robot)
     add_exposure(
         builder,
         colors,
