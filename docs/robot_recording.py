@@ -23,7 +23,7 @@ from unilavira_drake.worlds.scenery import add_scenery
 
 RATE = 12.0
 """Pictures a simulated second."""
-WALLS = 1.0
+WALLS = 0.6
 """Height of what is left of the walls, metres."""
 CAPTION = (
     "position:fixed;left:0;bottom:0;margin:14px;padding:8px 12px;max-width:60em;"
@@ -111,7 +111,7 @@ def _set_the_scene(meshcat: Meshcat, way: NDArray[np.float64]) -> None:
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.3)
     meshcat.SetProperty("/Lights/FillLight/<object>", "intensity", 2.2)
     meshcat.SetProperty("/Lights/FillLight/<object>", "position", [-5.0, -12.0, 9.0])
-    meshcat.SetCameraPose((6.5, -2.6, 8.0), (6.5, 4.2, 0.0))
+    meshcat.SetCameraPose((6.5, -1.0, 9.4), (6.5, 4.5, 0.0))
     vertices, faces = _ribbon(way, 0.05)
     meshcat.SetTriangleMesh("/way", vertices, faces, Rgba(0.9, 0.35, 0.1, 1.0))
 
