@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import numpy as np
@@ -142,12 +143,12 @@ def test_the_robot_is_not_in_its_own_view(rig):
     for geometry in mine:
         if inspector.GetProximityProperties(geometry) is not None:
             continue
-        size = inspector.GetShape(geometry).size()
-        p_BG = inspector.GetPoseInFrame(geometry).translation()
-        ahead = p_BG[0] + size[0] / 2 - X_BC.translation()[0]
-        below = X_BC.translation()[2] - p_BG[2] - size[2] / 2
-        if ahead > 0:
-            assert math.atan2(below, ahead) > half_height
+        obb = inspector.GetObbInGeometryFrame(geometry)
+        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+        p_GV = obb.pose().multiply((signs * obb.half_width()).T)
+        p_CV = (inspector.GetPoseInFrame(geometry).multiply(p_GV)).T - X_BC.translation()
+        for ahead, _, above in p_CV[p_CV[:, 0] > 0]:
+            assert math.atan2(-above, ahead) > half_height
     assert inspector.NumGeometriesWithRole(Role.kIllustration) > len(mine) // 2
 
 
