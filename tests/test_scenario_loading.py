@@ -83,7 +83,7 @@ def test_the_later_setting_wins_and_tags_are_read() -> None:
         ("tasks.fridge.accept=[1]", ["tasks.fridge.accept.0", "quotes"]),
         ("language_latency=!ConstantLatensy {}", ["did you mean '!ConstantLatency'"]),
         ("language_latency.seconds=3", ["needs a tag", "!ConstantLatency"]),
-        ("robot=!Spot {}", ["robot", "takes no tag", "!Spot"]),
+        ("robot=!Spot {}", ["robot", "unknown tag", "!Spot"]),
         ("tick=0.055", ["tick", "plant.time_step (0.025)", "0.05"]),
         ("robot.control_period=0.004", ["robot.control_period", "0.004", "0.025"]),
         ("tick=.nan", ["tick", "nan", "a positive number"]),

@@ -7,8 +7,11 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import DiagramBuilder, System
 
 from unilavira_drake.robots.ground_actuation import add_ground_actuation, set_ground_start
+from unilavira_drake.robots.quadrotor import Quadrotor
+from unilavira_drake.robots.quadrotor_actuation import add_quadrotor_actuation, set_flight_start
 from unilavira_drake.robots.robot import GroundRobot, Robot
 from unilavira_drake.robots.terrain import GroundHeight
+from unilavira_drake.robots.wind import STILL_AIR, WindModel
 
 
 def add_actuation(
@@ -18,6 +21,8 @@ def add_actuation(
     robot: Robot,
     locomotion: System | None = None,
     ground_height: GroundHeight | None = None,
+    *,
+    wind: WindModel = STILL_AIR,
 ) -> None:
     """Adds what turns ``base_command`` into motion, and says where the robot is.
 
@@ -32,14 +37,17 @@ def add_actuation(
         locomotion: a System of the user's own in the place of ours, with its ports: a gait policy,
             a whole-body controller.
         ground_height: of the world, for a robot that climbs.
+        wind: that pushes aircraft.
 
     Raises:
         TypeError: if nothing is known to move such a robot.
     """
     if isinstance(robot, GroundRobot):
         add_ground_actuation(builder, plant, model_instance, robot, locomotion, ground_height)
+    elif isinstance(robot, Quadrotor):
+        add_quadrotor_actuation(builder, plant, model_instance, robot, wind=wind)
     else:
-        raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")
+        raise TypeError(_unknown(robot))
 
 
 def set_start(
@@ -56,12 +64,18 @@ def set_start(
         model_instance: of the robot.
         robot: its type chooses what is set.
         start: x, y (metres) and yaw (radians).
-        height: of the floor at the start, metres.
+        height: of the floor at the start, metres; of an aircraft, which may start above it.
 
     Raises:
         TypeError: as ``add_actuation``.
     """
     if isinstance(robot, GroundRobot):
         set_ground_start(plant, model_instance, start, height)
+    elif isinstance(robot, Quadrotor):
+        set_flight_start(plant, model_instance, robot, start, height)
     else:
-        raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")
+        raise TypeError(_unknown(robot))
+
+
+def _unknown(robot: Robot) -> str:
+    return f"nothing moves a {type(robot).__name__}; derive it from GroundRobot or Quadrotor"
