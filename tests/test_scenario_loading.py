@@ -144,7 +144,7 @@ def test_a_file_s_mistake_is_told_with_its_line(tmp_path: Path) -> None:
     [
         ("flta", "did you mean 'flat'"),
         ("no/such.yaml", "no file"),
-        ("", "valid: apartment, apartment_eqa, apartment_objectnav, flat, office"),
+        ("", "valid: apartment, apartment_eqa, apartment_objectnav"),
     ],
 )
 def test_an_unknown_scenario_is_told(name: str, fragment: str) -> None:
