@@ -22,7 +22,7 @@ LAYERS = (
     ("robots",),
     ("scenario", "scenario_schema", "task_choice"),
     ("scenario_checks", "scenario_loading", "episode_monitor", "wiring"),
-    ("station", "station_cameras", "agent", "navigation", "model_pair"),
+    ("station", "station_cameras", "agent", "flight_navigation", "navigation", "model_pair"),
     ("recording",),
     ("diagram", "evaluation"),
     ("episode_result", "report"),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pydrake.systems.framework import Diagram, System
 
 from unilavira_drake.language.system import Language
+from unilavira_drake.mapping.flight_goals import FlightGoals
 from unilavira_drake.mapping.goal_selector import GoalSelector
 from unilavira_drake.memory.config import MemoryConfig
 from unilavira_drake.memory.revert_system import OneStepRevert
@@ -25,6 +26,8 @@ from unilavira_drake.vision.grounder import Grounder
 from unilavira_drake.vision.grounding import Propose, from_pictures
 from unilavira_drake.vision.system import Vision
 from unilavira_drake.wiring import Wiring
+
+FLIGHT_GOALS = FlightGoals()
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,7 @@ def make_agent(
     max_range: float,
     free_distance: Callable[[Frame], float],
     detector: Callable[[Frame], ViewEvidence],
+    flight: FlightGoals = FLIGHT_GOALS,
     prompt_preset: str = "compact",
     grounder: str = "none",
     people: bool = False,
@@ -62,7 +66,8 @@ def make_agent(
     An ablation is wiring: without TDM ``todo_list`` stays unconnected, without SCB
     ``second_chance`` does; ``lavira``, the predecessor, has no TDM and a ``OneStepRevert``. The
     detector reaches a level only when its model declares ``perception: ground_truth``. Targets
-    beyond ``max_range`` (metres) are refused. ``prompt_preset`` is a key of ``PROMPT_PRESETS``.
+    beyond ``max_range`` (metres) are refused. ``flight`` says how near and far an aircraft goes.
+    ``prompt_preset`` is a key of ``PROMPT_PRESETS``.
     ``grounder`` is ``none``, ``color`` or ``label`` (which reads the detector); a ``grounder`` in
     ``replace`` is wired in any case. ``people``: its prompts say who is where and moves how.
     """
@@ -114,7 +119,7 @@ def make_agent(
             picture_width=preset.history_width,
         ),
     )
-    wiring.add("goal_selector", lambda: GoalSelector(max_range=max_range))
+    wiring.add("goal_selector", lambda: GoalSelector(max_range=max_range, flight=flight))
     wiring.connect("waypoint_memory", "history", "language")
     if ablation in ("full", "no_tdm"):
         wiring.connect("waypoint_memory", "second_chance", "language")

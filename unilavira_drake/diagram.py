@@ -12,6 +12,7 @@ from pydrake.systems.primitives import ConstantValueSource
 from unilavira_drake.agent import ModelChoice, has_grounder, make_agent
 from unilavira_drake.episode_monitor import EpisodeMonitor
 from unilavira_drake.errors import ScenarioError, unknown_name
+from unilavira_drake.mapping.flight_goals import FlightGoals
 from unilavira_drake.messages import Frame
 from unilavira_drake.mllm.evidence import ViewEvidence
 from unilavira_drake.model_pair import ModelPair, make_models
@@ -21,7 +22,8 @@ from unilavira_drake.people.config import tells_of_people
 from unilavira_drake.people.crowd import detected_labels, make_crowd, with_people
 from unilavira_drake.people.tracker import PeopleTracker
 from unilavira_drake.recording.recorder import Recorder
-from unilavira_drake.scenario import Scenario
+from unilavira_drake.robots.quadrotor import Quadrotor
+from unilavira_drake.scenario import Scenario, plant_config
 from unilavira_drake.sensors.detections import GroundTruthDetector
 from unilavira_drake.sensors.free_distance import free_distance, warm_up
 from unilavira_drake.sensors.observer import Observer
@@ -74,6 +76,7 @@ def make_navigation_diagram(
     task = choose_task(scenario)
     x, y, height, yaw = parse_start_pose(task.start, world, radius=scenario.robot.turning_radius)
     intrinsics = front_intrinsics(scenario.robot)
+    lowest, highest = _heights_in_the_way(scenario)
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))
     wiring.add(
@@ -94,6 +97,8 @@ def make_navigation_diagram(
             views=scenario.robot.views,
             sweep_direction=scenario.robot.sweep_direction,
             max_age=oldest_panorama(scenario.people),
+            rest_rate=scenario.robot.rest_rate,
+            rest_speed=scenario.robot.rest_speed,
         ),
     )
     wiring.add(
@@ -109,12 +114,17 @@ def make_navigation_diagram(
             max_range=scenario.robot.max_depth,
             free_distance=functools.partial(
                 free_distance,
-                min_height=scenario.mapping.min_height,
-                max_height=scenario.mapping.max_height,
+                min_height=lowest,
+                max_height=highest,
                 max_range=scenario.robot.max_depth,
             ),
             detector=functools.lru_cache(FRAMES_KEPT)(
                 detector or GroundTruthDetector(world.labels, max_range=scenario.robot.max_depth)
+            ),
+            flight=FlightGoals(
+                stand_off=scenario.flight.stand_off,
+                clearance=scenario.flight.goal_clearance,
+                horizon=scenario.flight.horizon,
             ),
             prompt_preset=scenario.prompt_preset,
             grounder=scenario.grounder,
@@ -129,8 +139,9 @@ def make_navigation_diagram(
             intrinsics=intrinsics,
             mapping=mapping_among(scenario.people, scenario.mapping),
             planning=planning_among(scenario.people, scenario.planning),
+            flight=scenario.flight,
             tick=scenario.tick,
-            time_step=scenario.plant.time_step,
+            time_step=plant_config(scenario).time_step,
             replace=own,
             moving_labels=detected_labels(world, scenario.people),
         ),
@@ -150,13 +161,26 @@ def make_navigation_diagram(
         _track_people(wiring, scenario, world, (x, y))
     if on_message is not None:
         wiring.add(
-            "recorder", lambda: Recorder(on_message, period=scenario.tick, grounder=grounder)
+            "recorder",
+            lambda: Recorder(
+                on_message,
+                period=scenario.tick,
+                grounder=grounder,
+                in_flight=isinstance(scenario.robot, Quadrotor),
+            ),
         )
         _listen(wiring, todo=scenario.ablation in ("full", "no_scb"), grounder=grounder)
     if own:
         levels = (*_TOP_LEVELS, *_PEOPLE_LEVELS, "locomotion", *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
         raise ScenarioError(unknown_name("level", next(iter(own)), levels, "replace"))
     return wiring.build("unilavira")
+
+
+def _heights_in_the_way(scenario: Scenario) -> tuple[float, float]:
+    """Returns between which heights, metres, something is in the robot's way."""
+    if isinstance(scenario.robot, Quadrotor):
+        return scenario.flight.min_altitude, scenario.flight.max_altitude
+    return scenario.mapping.min_height, scenario.mapping.max_height
 
 
 _PEOPLE_LEVELS = ("people_tracker",)

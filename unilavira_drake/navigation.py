@@ -7,6 +7,7 @@ from collections.abc import MutableMapping, Sequence
 
 from pydrake.systems.framework import Diagram, System
 
+from unilavira_drake.flight_navigation import make_flight_navigation
 from unilavira_drake.mapping.config import MappingConfig
 from unilavira_drake.mapping.occupancy import NEWEST
 from unilavira_drake.mapping.system import OccupancyMapper
@@ -14,8 +15,10 @@ from unilavira_drake.messages import Intrinsics
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.planning.system import FastMarchingPlanner
 from unilavira_drake.robots.drive_limits import DriveLimits, Reaction
+from unilavira_drake.robots.flight_config import FlightConfig
 from unilavira_drake.robots.governor import Governor
 from unilavira_drake.robots.ground_controller import GroundTrackingController
+from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.robots.robot import GroundRobot, Robot
 from unilavira_drake.robots.stopping import Footprint
 from unilavira_drake.wiring import Wiring
@@ -27,6 +30,7 @@ def make_navigation(
     intrinsics: Intrinsics,
     mapping: MappingConfig,
     planning: PlanningConfig,
+    flight: FlightConfig,
     tick: float,
     time_step: float,
     replace: MutableMapping[str, System] | None = None,
@@ -43,7 +47,18 @@ def make_navigation(
         return _make_ground_navigation(
             robot, intrinsics, mapping, planning, tick, time_step, replace, moving_labels
         )
-    raise TypeError(f"nothing steers a {type(robot).__name__}; derive it from GroundRobot")
+    if isinstance(robot, Quadrotor):
+        return make_flight_navigation(
+            robot=robot,
+            intrinsics=intrinsics,
+            flight=flight,
+            tick=tick,
+            time_step=time_step,
+            replace=replace,
+        )
+    raise TypeError(
+        f"nothing steers a {type(robot).__name__}; derive it from GroundRobot or Quadrotor"
+    )
 
 
 def _make_ground_navigation(

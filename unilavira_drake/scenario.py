@@ -4,6 +4,7 @@ Read by Drake's ``yaml_load_typed``: a tag (``!CobotMagic``) chooses among types
 is an error, and overlays change single values.  Every flag of the command is such an overlay.
 """
 
+import copy
 import dataclasses as dc
 import typing
 
@@ -23,7 +24,9 @@ from unilavira_drake.mllm.latency import (
 from unilavira_drake.people.config import PeopleConfig
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.robots.cobot_magic import CobotMagic
+from unilavira_drake.robots.flight_config import FlightConfig
 from unilavira_drake.robots.localization_config import PoseEstimateConfig
+from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.robots.robot import Robot
 from unilavira_drake.robots.unitree_g1 import UnitreeG1
 from unilavira_drake.robots.unitree_go1 import UnitreeGo1
@@ -36,7 +39,7 @@ RENDERERS = ("vtk", "raster")
 GROUNDERS = ("none", "color", "label")
 
 # The first one is meant where a file writes no tag.
-RobotChoice = CobotMagic | UnitreeGo1 | UnitreeG1
+RobotChoice = CobotMagic | UnitreeGo1 | UnitreeG1 | Quadrotor
 
 # Likewise.
 LatencyChoice = (
@@ -158,12 +161,23 @@ class Scenario:
     budgets: Budgets = dc.field(default_factory=Budgets)
     mapping: MappingConfig = dc.field(default_factory=MappingConfig)
     planning: PlanningConfig = dc.field(default_factory=PlanningConfig)
+    # Of aircraft, in place of mapping and planning.
+    flight: FlightConfig = dc.field(default_factory=FlightConfig)
     memory: MemoryConfig = dc.field(default_factory=MemoryConfig)
+    # A robot may need shorter steps.
     plant: MultibodyPlantConfig = dc.field(
         default_factory=lambda: MultibodyPlantConfig(
             time_step=0.025, discrete_contact_approximation="lagged"
         )
     )
+
+
+def plant_config(scenario: Scenario) -> MultibodyPlantConfig:
+    """Returns the plant's configuration, its steps no longer than the robot's autopilot needs."""
+    config = copy.copy(scenario.plant)
+    if isinstance(scenario.robot, Quadrotor):
+        config.time_step = min(config.time_step, scenario.robot.max_time_step)
+    return config
 
 
 def register_robot(kind: type[Robot]) -> None:

@@ -24,7 +24,14 @@ from unilavira_drake.mllm.latency import (
 )
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
 from unilavira_drake.people.crowd import make_crowd, with_people
-from unilavira_drake.scenario import ABLATIONS, GROUNDERS, RENDERERS, Scenario, robot_kinds
+from unilavira_drake.scenario import (
+    ABLATIONS,
+    GROUNDERS,
+    RENDERERS,
+    Scenario,
+    plant_config,
+    robot_kinds,
+)
 from unilavira_drake.sensors.exposure_config import EXPOSURES
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.tasks import FAMILIES, checked_task, success_rule
@@ -77,6 +84,16 @@ _RULES: dict[str, _Rule] = {
     "pose_estimate.position_drift": _NOT_NEGATIVE,
     "pose_estimate.yaw_drift_degrees": _NOT_NEGATIVE,
     "exposure.target": ("0.01 to 1", lambda v: 0.01 <= v <= 1),
+    "flight.wind.speed": _NOT_NEGATIVE,
+    "flight.wind.direction_degrees": ("-360 to 360 degrees", lambda v: abs(v) <= 360),
+    "flight.wind.gusts": _NOT_NEGATIVE,
+    "flight.snap_distance": _NOT_NEGATIVE,
+    "flight.ground_margin": _NOT_NEGATIVE,
+    "flight.ceiling_margin": _NOT_NEGATIVE,
+    "flight.stride": ("1 to 32", lambda v: 1 <= v <= 32),
+    "robot.max_tilt_degrees": ("1 to 45 degrees", lambda v: 1 <= v <= 45),
+    "robot.linear_drag": _NOT_NEGATIVE,
+    "robot.quadratic_drag": _NOT_NEGATIVE,
     "robot.horizontal_fov_degrees": ("between 10 and 150 degrees", lambda v: 10 <= v <= 150),
 }
 """Every other number of a scenario must be positive; Drake checks those of ``plant``."""
@@ -106,6 +123,7 @@ def validate(scenario: Scenario) -> None:
     if scenario.judge_model:
         make_judge(scenario.judge_model)
     _check_order(scenario)
+    _check_air(scenario)
     _check_plant(scenario)
     _check_periods(scenario)
     _check_tasks(scenario)
@@ -175,12 +193,15 @@ def _check_model(scenario: Scenario, role: str) -> None:
 
 
 def _check_order(scenario: Scenario) -> None:
-    robot, mapping = scenario.robot, scenario.mapping
+    robot, mapping, flight = scenario.robot, scenario.mapping, scenario.flight
     for low, high, low_value, high_value in (
         ("robot.min_depth", "robot.max_depth", robot.min_depth, robot.max_depth),
         ("robot.min_depth", "mapping.max_range", robot.min_depth, mapping.max_range),
         ("mapping.min_height", "mapping.max_height", mapping.min_height, mapping.max_height),
         ("mapping.resolution", "mapping.max_range", mapping.resolution, mapping.max_range),
+        ("flight.resolution", "flight.max_range", flight.resolution, flight.max_range),
+        ("flight.min_altitude", "flight.max_altitude", flight.min_altitude, flight.max_altitude),
+        ("flight.max_range", "flight.resolution x 400", flight.max_range, 400 * flight.resolution),
     ):
         if low_value >= high_value:
             raise ScenarioError(
@@ -215,6 +236,23 @@ def _check_people(scenario: Scenario, world: World, robot: tuple[float, float]) 
     make_crowd(people, with_people(world, people), seed=scenario.random_seed, robot=robot)
 
 
+def _check_air(scenario: Scenario) -> None:
+    flight = scenario.flight
+    if not flight.min_altitude <= flight.takeoff_altitude <= flight.max_altitude:
+        raise ScenarioError(
+            f"flight.takeoff_altitude: {flight.takeoff_altitude} is not between min_altitude "
+            f"({flight.min_altitude}) and max_altitude ({flight.max_altitude})."
+        )
+    fence = flight.geofence
+    if not fence:
+        return
+    finite = all(isinstance(side, int | float) and math.isfinite(side) for side in fence)
+    if len(fence) != 4 or not finite or fence[0] >= fence[2] or fence[1] >= fence[3]:
+        raise ScenarioError(
+            f"flight.geofence: {fence} is not usable; give x_min, y_min, x_max, y_max in metres."
+        )
+
+
 def _check_plant(scenario: Scenario) -> None:
     if scenario.plant.time_step <= 0:
         raise ScenarioError(
@@ -228,7 +266,7 @@ def _check_plant(scenario: Scenario) -> None:
 
 
 def _check_periods(scenario: Scenario) -> None:
-    step = scenario.plant.time_step
+    step = plant_config(scenario).time_step
     for place, period in (
         ("tick", scenario.tick),
         ("robot.control_period", scenario.robot.control_period),
@@ -236,6 +274,7 @@ def _check_periods(scenario: Scenario) -> None:
             "pose_estimate.period",
             step if scenario.pose_estimate.exact else scenario.pose_estimate.period,
         ),
+        ("robot.autopilot_period", getattr(scenario.robot, "autopilot_period", step)),
         ("robot.command_period", getattr(scenario.robot, "command_period", 0.0) or step),
     ):
         steps = period / step

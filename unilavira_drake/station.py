@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from pydrake.geometry import SceneGraph
@@ -19,9 +20,12 @@ from unilavira_drake.raster import raster_works
 from unilavira_drake.resources import package_xml
 from unilavira_drake.robots.actuation import add_actuation, set_start
 from unilavira_drake.robots.planar_base import HEIGHT_JOINT
+from unilavira_drake.robots.quadrotor import Quadrotor
+from unilavira_drake.robots.quadrotor_actuation import add_landing_ground
 from unilavira_drake.robots.robot import Robot
 from unilavira_drake.robots.terrain import climbing_model, follow_terrain
-from unilavira_drake.scenario import Scenario
+from unilavira_drake.robots.wind import WindModel
+from unilavira_drake.scenario import Scenario, plant_config
 from unilavira_drake.sensors.rig import add_renderer
 from unilavira_drake.station_cameras import (
     add_camera_mounts,
@@ -101,7 +105,7 @@ def make_navigation_station(
         scenario: what to build.
         world: read from the scenario when None.
         start: x, y (metres) and yaw (radians); the chosen task's start when None.
-        start_height: of the floor at ``start``, metres; only a robot that climbs is not at 0.
+        start_height: of the floor at ``start``, metres, or of an aircraft in the air.
         locomotion: a System in the place of the robot's own, see ``add_actuation``.
 
     Raises:
@@ -130,6 +134,7 @@ def make_navigation_station(
         localization=scenario.pose_estimate,
         seed=scenario.random_seed,
         ground_height=world.ground_height,
+        wind=_wind(scenario),
     )
     base = plant.GetBodyByName("base", model_instance)
     if people:
@@ -155,12 +160,25 @@ def make_navigation_station(
     return station
 
 
+def _wind(scenario: Scenario) -> WindModel:
+    wind = scenario.flight.wind
+    return WindModel(
+        wind.speed,
+        math.radians(wind.direction_degrees),
+        wind.gusts,
+        wind.correlation_time,
+        scenario.random_seed,
+    )
+
+
 def _add_scene(
     builder: DiagramBuilder, scenario: Scenario, world: World, people: tuple[Person, ...]
 ) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
-    plant, scene_graph = AddMultibodyPlant(scenario.plant, builder)
+    plant, scene_graph = AddMultibodyPlant(plant_config(scenario), builder)
     ground = add_scenery(plant, scene_graph, world)
     model_instance = _add_robot(plant, scenario.robot)
+    if isinstance(scenario.robot, Quadrotor):
+        add_landing_ground(plant)
     add_people(plant, scene_graph, people)
     if plant.HasJointNamed(HEIGHT_JOINT, model_instance):
         follow_terrain(plant, scene_graph, model_instance, ground)

@@ -38,15 +38,16 @@ def add_raster_cameras(
 ) -> dict[str, OutputPort]:
     """Adds our own cameras, whose pictures depend on positions alone; a clone shares them.
 
-    Front is a camera of its own, whose depth is wanted all the way; the others are one rig, drawn
-    in one call.
+    Front and down are cameras of their own, whose depth is wanted all the way; the others are one
+    rig, drawn in one call.
 
     Returns:
         The port of each view's colours; depth and label are exported.
     """
     colors = {}
-    others = tuple(view for view in robot.views if view != "front")
-    for name, views in (("front_camera", ("front",)), ("other_cameras", others)):
+    alone = [(camera_frame(view), (view,)) for view in ("front", "down") if view in robot.views]
+    others = tuple(view for view in robot.views if view not in ("front", "down"))
+    for name, views in (*alone, ("other_cameras", others)):
         if not views:
             continue
         camera = add_raster_rgbd_camera(

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from flying_body import Flight, hovering
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
+from simulated_quadrotor import Flight, hovering
 
 from unilavira_drake.robots.flight_autopilot import FlightAutopilot
 from unilavira_drake.robots.flight_cascade import specific_thrust, velocity_setpoint

@@ -1,7 +1,7 @@
 """Gusts against the statistics of their process; drag against its formula."""
 
 import numpy as np
-from flying_body import hovering
+from simulated_quadrotor import hovering
 
 from unilavira_drake.robots.gusts import next_gust, normal
 from unilavira_drake.robots.wind import Wind, WindModel

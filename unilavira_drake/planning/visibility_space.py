@@ -9,6 +9,7 @@ occupied or free.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -49,6 +50,7 @@ class Clearance(Message):
             if not 0.0 <= value < math.inf:
                 raise ValueError("radius and margins must be finite and not negative")
 
+    @functools.lru_cache(maxsize=8)  # noqa: B019 (frozen, and few)
     def columns(self, resolution: float) -> NDArray[np.int64]:
         """Returns (m, 4) offsets dx, dy of columns, and how far down and up each is to be free.
 

@@ -31,6 +31,9 @@ from unilavira_drake.planning.visibility_path import path_is_blocked, remaining_
 from unilavira_drake.planning.visibility_space import Clearance, FlightSpace, update_space
 from unilavira_drake.ports import Level, message_input, pose_input
 
+AIRSPACE_ENDS = "the airspace ends here"
+"""Why an arrival is not the end of the way: the goal lies beyond the geofence or the altitudes."""
+
 PROGRESS = 0.1
 """The way that remains must shrink by this much to count as progress, metres."""
 
@@ -72,7 +75,9 @@ class VisibilityPlannerState(Message):
 class VisibilityPlanner(Level):
     """Plans through free space to each goal and reports ``arrived`` or ``failed`` with the reason.
 
-    Goal n is taken up once the map holds panorama n.  Unknown space is taken to be free.  While
+    The first thing to fly is the way up to ``takeoff_altitude``; status 0 is ``moving`` until
+    then.  Goal n is taken up once the map holds panorama n.  A goal beyond the geofence or the
+    altitudes is moved to the nearest place within.  Unknown space is taken to be free.  While
     the aircraft moves, the way is planned anew when a new map blocks it, or when the map changed,
     the plan is ``replan_period`` old and the goal is not near.  ``path`` carries (k, 3) points.
     Reasons of failure: the goal's own, ``unreachable``, ``no free space within ... m``, ``no free
@@ -96,6 +101,9 @@ class VisibilityPlanner(Level):
         ceiling_margin: kept free above it, metres.
         min_altitude: lowest z of its centre in the world, metres.
         max_altitude: highest z of its centre in the world, metres.
+        geofence: x_min, y_min, x_max, y_max of its centre, metres; empty: none.
+        takeoff_altitude: z to which it climbs before everything else, metres; None: it is in
+            the air already.
         climb_angle: steepest path above the horizon, radians; pi / 2 is no limit.
         descend_angle: steepest path below the horizon, radians.
         snap_distance: a goal moves at most this far to free space, metres.
@@ -118,6 +126,8 @@ class VisibilityPlanner(Level):
         ceiling_margin: float = 0.5,
         min_altitude: float = 1.0,
         max_altitude: float = 60.0,
+        geofence: tuple[float, ...] = (),
+        takeoff_altitude: float | None = None,
         climb_angle: float = math.radians(45.0),
         descend_angle: float = math.radians(45.0),
         snap_distance: float = 3.0,
@@ -138,7 +148,12 @@ class VisibilityPlanner(Level):
             max_distance=max_distance,
         )
         space = FlightSpace(clearance=self._parameters.clearance)
-        super().__init__(VisibilityPlannerState(path=_no_path(0), space=space), period=period)
+        start = NavigationStatus(0, "arrived" if takeoff_altitude is None else "moving")
+        initial = VisibilityPlannerState(start, _no_path(0), space=space)
+        super().__init__(initial, period=period)
+        x_min, y_min, x_max, y_max = geofence or (-math.inf, -math.inf, math.inf, math.inf)
+        self._fence = ((x_min, x_max), (y_min, y_max), (min_altitude, max_altitude))
+        self._takeoff_altitude = takeoff_altitude
         self._tolerance = tolerance
         self._stuck_time = stuck_time
         self._travel_factor = travel_factor
@@ -147,12 +162,14 @@ class VisibilityPlanner(Level):
         self._pose = pose_input(self, "pose_estimate")
         self._goal = message_input(self, "goal", Goal())
         self.declare_output("path", lambda state: state.path, _no_path(0))
-        self.declare_output("navigation_status", lambda state: state.status, NavigationStatus())
+        self.declare_output("navigation_status", lambda state: state.status, start)
         warm_up()
 
     def step(self, context: Context, state: Any) -> Any:
         """Returns the state after a new goal, a new map or some way flown; see the class."""
         time = context.get_time()
+        if not state.status.terminal and not len(state.path.p_WP):
+            return self._take_off(state, self._map(context), self._position(context), time)
         if not state.status.terminal:
             return self._follow(state, self._map(context), self._position(context), time)
         goal = self._goal(context)
@@ -171,6 +188,17 @@ class VisibilityPlanner(Level):
         x, y, z = self._pose(context).translation()
         return (float(x), float(y), float(z))
 
+    def _take_off(
+        self, state: VisibilityPlannerState, voxels: VoxelMap, position: Point, time: float
+    ) -> VisibilityPlannerState:
+        """Returns the state at the start of the flight: the way up is goal 0."""
+        if not believable(position):
+            return state
+        assert self._takeoff_altitude is not None
+        x, y, z = position
+        up = Goal(0, "go", (x, y, max(z, self._takeoff_altitude)))
+        return self._begin(up, state, voxels, position, time)
+
     def _begin(
         self,
         goal: Goal,
@@ -182,13 +210,17 @@ class VisibilityPlanner(Level):
         assert goal.p_WG is not None
         if len(goal.p_WG) != 3:
             return _done(state, goal.n, "failed", "the goal is not a point in space", None)
+        x, y, z = (
+            min(max(a, low), high) for a, (low, high) in zip(goal.p_WG, self._fence, strict=True)
+        )
+        beyond = math.dist((x, y, z), goal.p_WG) > self._tolerance
         fresh = VisibilityPlannerState(
             status=NavigationStatus(goal.n, "moving"),
             path=_no_path(0),
             heading=goal.heading,
-            target=goal.p_WG,
+            target=(x, y, z),
             mark=goal.p_WT,
-            reason=ON_THE_WAY if goal.partial else "",
+            reason=AIRSPACE_ENDS if beyond else ON_THE_WAY if goal.partial else "",
             viewpoint=position,
             space=state.space,
             progress_time=time,

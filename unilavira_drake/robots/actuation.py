@@ -9,8 +9,11 @@ from pydrake.systems.framework import DiagramBuilder, System
 from unilavira_drake.robots.ground_actuation import add_ground_actuation, set_ground_start
 from unilavira_drake.robots.localization_config import PoseEstimateConfig
 from unilavira_drake.robots.pose_estimator import PoseEstimator
+from unilavira_drake.robots.quadrotor import Quadrotor
+from unilavira_drake.robots.quadrotor_actuation import add_quadrotor_actuation, set_flight_start
 from unilavira_drake.robots.robot import GroundRobot, Robot
 from unilavira_drake.robots.terrain import GroundHeight
+from unilavira_drake.robots.wind import STILL_AIR, WindModel
 
 
 def add_actuation(
@@ -23,6 +26,7 @@ def add_actuation(
     localization: PoseEstimateConfig | None = None,
     seed: int = 0,
     ground_height: GroundHeight | None = None,
+    wind: WindModel = STILL_AIR,
 ) -> None:
     """Adds what turns ``base_command`` into motion, and says where the robot is.
 
@@ -40,6 +44,7 @@ def add_actuation(
         localization: the error of the pose estimate; none when None.
         seed: of that error.
         ground_height: of the world, for a robot that climbs.
+        wind: that pushes aircraft.
 
     Raises:
         TypeError: if nothing is known to move such a robot.
@@ -48,18 +53,25 @@ def add_actuation(
         X_WB, twist = add_ground_actuation(
             builder, plant, model_instance, robot, locomotion, ground_height
         )
+        believing = None
+    elif isinstance(robot, Quadrotor):
+        X_WB, twist, believing = add_quadrotor_actuation(
+            builder, plant, model_instance, robot, wind=wind
+        )
     else:
-        raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")
+        raise TypeError(_unknown(robot))
     builder.ExportOutput(X_WB, "cheat_X_WB")
     builder.ExportOutput(twist, "twist")
-    if localization is None or localization.exact:
-        builder.ExportOutput(X_WB, "pose_estimate")
-        return
-    estimator = builder.AddSystem(PoseEstimator(config=localization, seed=seed))
-    builder.Connect(X_WB, estimator.GetInputPort("X_WB"))
-    builder.Connect(twist, estimator.GetInputPort("twist"))
-    builder.ExportInput(estimator.GetInputPort("recalibrations"), "recalibrations")
-    builder.ExportOutput(estimator.GetOutputPort("pose_estimate"), "pose_estimate")
+    estimate = X_WB
+    if localization is not None and not localization.exact:
+        estimator = builder.AddSystem(PoseEstimator(config=localization, seed=seed))
+        builder.Connect(X_WB, estimator.GetInputPort("X_WB"))
+        builder.Connect(twist, estimator.GetInputPort("twist"))
+        builder.ExportInput(estimator.GetInputPort("recalibrations"), "recalibrations")
+        estimate = estimator.GetOutputPort("pose_estimate")
+    if believing is not None:
+        builder.Connect(estimate, believing)
+    builder.ExportOutput(estimate, "pose_estimate")
 
 
 def set_start(
@@ -76,12 +88,18 @@ def set_start(
         model_instance: of the robot.
         robot: its type chooses what is set.
         start: x, y (metres) and yaw (radians).
-        height: of the floor at the start, metres.
+        height: of the floor at the start, metres; of an aircraft, which may start above it.
 
     Raises:
         TypeError: as ``add_actuation``.
     """
     if isinstance(robot, GroundRobot):
         set_ground_start(plant, model_instance, start, height)
+    elif isinstance(robot, Quadrotor):
+        set_flight_start(plant, model_instance, robot, start, height)
     else:
-        raise TypeError(f"nothing moves a {type(robot).__name__}; derive it from GroundRobot")
+        raise TypeError(_unknown(robot))
+
+
+def _unknown(robot: Robot) -> str:
+    return f"nothing moves a {type(robot).__name__}; derive it from GroundRobot or Quadrotor"

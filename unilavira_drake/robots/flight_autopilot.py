@@ -8,8 +8,8 @@ import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from unilavira_drake.ports import pose_input, vector_input
-from unilavira_drake.robots.flight_cascade import MEMORY, fly, warm_up
-from unilavira_drake.robots.flight_limits import GRAVITY, Airframe, AutopilotGains
+from unilavira_drake.robots.flight_cascade import MEMORY, pilot, warm_up
+from unilavira_drake.robots.flight_limits import Airframe, AutopilotGains
 
 
 class FlightAutopilot(LeafSystem):
@@ -52,39 +52,21 @@ class FlightAutopilot(LeafSystem):
         self._pose = pose_input(self, "pose_estimate")
         self._twist = vector_input(self, "twist", 6)
         rotors = self.DeclareDiscreteState(4)
-        # The cascade's memory, the latest finite setpoint's x, y, z and yaw, and whether there
-        # was one.
         memory = self.DeclareDiscreteState(MEMORY + 5)
         self._rotors_index, self._memory_index = int(rotors), int(memory)
         self.DeclareStateOutputPort("rotor_command", rotors)
         self.DeclarePeriodicDiscreteUpdateEvent(period, offset, self._update)
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
-        old: Any = context.get_discrete_state(self._memory_index).value()
-        setpoint = np.array(self._command(context))
-        if np.isfinite(setpoint).all():
-            memory = np.append(old[:MEMORY], [*setpoint[:4], 1.0])
-        elif old[-1] == 0.0:
-            return
-        else:
-            memory = np.array(old)
-            setpoint = np.append(memory[MEMORY:-1], np.zeros(3))
-        X_WB: Any = self._pose(context).GetAsMatrix34()
-        twist = np.array(self._twist(context))
-        rotors = np.full(4, 0.25 * self._airframe.mass * GRAVITY)
-        if np.isfinite(X_WB).all() and np.isfinite(twist).all():
-            R_WB = np.ascontiguousarray(X_WB[:, :3])
-            fly(
-                memory[:MEMORY],
-                R_WB,
-                np.ascontiguousarray(X_WB[:, 3]),
-                R_WB @ twist[3:],
-                twist[:3],
-                setpoint,
-                self._period,
-                self._airframe,
-                self._gains,
-                rotors,
-            )
-        discrete_state.set_value(self._rotors_index, rotors)  # type: ignore[arg-type]
-        discrete_state.set_value(self._memory_index, memory)  # type: ignore[arg-type]
+        memory: Any = np.array(context.get_discrete_state(self._memory_index).value())
+        rotors: Any = pilot(
+            memory,
+            np.array(self._command(context)),
+            np.ascontiguousarray(self._pose(context).GetAsMatrix34()),
+            np.array(self._twist(context)),
+            self._period,
+            self._airframe,
+            self._gains,
+        )
+        discrete_state.set_value(self._rotors_index, rotors)
+        discrete_state.set_value(self._memory_index, memory)

@@ -16,10 +16,10 @@ from unilavira_drake.robots.flight_attitude import attitude_error, attitude_of, 
 from unilavira_drake.robots.flight_limits import GRAVITY, Airframe, AutopilotGains
 from unilavira_drake.robots.rotor_mixer import mix
 
-MEMORY = 19
+MEMORY = 22
 """Numbers that the cascade remembers: integrals of velocity and rate error (3 each), the filtered
-derivatives of velocity and rate (3 each), velocity and rate before (3 each), and whether those two
-are known."""
+derivatives of velocity and rate (3 each), velocity and rate before (3 each), whether those two are
+known, and the filtered velocity of the setpoint (3)."""
 
 WINDUP = 3.0
 """Bound on the integral of the velocity loop, m/s^2."""
@@ -83,7 +83,7 @@ def fly(
     """Makes one step of the cascade: changes ``memory``, fills ``rotors`` with newtons.
 
     Args:
-        memory: (19,) float64; zeros at first.
+        memory: (22,) float64; zeros at first.
         R_WB: (3, 3) attitude.
         p_WB: (3,) position, metres.
         v_WB: (3,) velocity in the world, m/s.
@@ -98,7 +98,10 @@ def fly(
     _derive(memory, v_WB, w_WB_B, period, gains)
     # Velocity PID.
     error = velocity_setpoint(p_WB, setpoint, gains) - v_WB
-    wish = gains.velocity_p * error + velocity_integral - gains.velocity_d * memory[6:9]
+    # What the moving setpoint gains in speed is not left to the error.
+    ahead = (setpoint[4:7] - memory[19:22]) / gains.lead_time
+    memory[19:22] += min(period, gains.lead_time) * ahead
+    wish = gains.velocity_p * error + velocity_integral - gains.velocity_d * memory[6:9] + ahead
     f = specific_thrust(wish, airframe, gains)
     for i in range(3):
         # What could not be had is taken back from the error, as PX4 does.
@@ -153,10 +156,52 @@ def _derive(
     memory[18] = 1.0
 
 
+@kernel
+def pilot(
+    memory: NDArray[np.float64],
+    command: NDArray[np.float64],
+    X_WB: NDArray[np.float64],
+    twist: NDArray[np.float64],
+    period: float,
+    airframe: Airframe,
+    gains: AutopilotGains,
+) -> NDArray[np.float64]:
+    """Returns the thrust of each rotor, newtons, whatever the numbers are; (4,) float64.
+
+    Args:
+        memory: (27,) float64, changed: the cascade's, then x, y, z and yaw of the latest finite
+            command, and whether there was one.
+        command: (7,) x, y, z, yaw, vx, vy, vz; what is not finite leaves it hovering where it was
+            last told to be.
+        X_WB: (3, 4) pose.  While pose or twist are not finite, the rotors carry the weight.
+        twist: (6,) [w; v] of B in W, expressed in B.
+        period: of the steps, seconds.
+        airframe: of the aircraft.
+        gains: of the cascade.
+    """
+    setpoint = np.zeros(7)
+    if np.isfinite(command).all():
+        setpoint[:] = command
+        memory[MEMORY : MEMORY + 4] = command[:4]
+        memory[MEMORY + 4] = 1.0
+    else:
+        setpoint[:4] = memory[MEMORY : MEMORY + 4]
+    if memory[MEMORY + 4] == 0.0:
+        return np.zeros(4)
+    rotors = np.full(4, 0.25 * airframe.mass * GRAVITY)
+    if np.isfinite(X_WB).all() and np.isfinite(twist).all():
+        R_WB = X_WB[:, :3].copy()
+        v_WB = np.zeros(3)
+        for i in range(3):
+            for j in range(3):
+                v_WB[i] += R_WB[i, j] * twist[3 + j]
+        fly(memory[:MEMORY], R_WB, X_WB[:, 3].copy(), v_WB, twist[:3].copy(), setpoint, period,
+            airframe, gains, rotors)  # fmt: skip
+    return rotors
+
+
 def warm_up() -> None:
     """Compiles the kernels, or loads them from numba's cache."""
-    rotors, zero = np.empty(4), np.zeros(3)
-    fly(
-        np.zeros(MEMORY), np.eye(3), zero, zero, zero, np.zeros(7), 0.01,
-        Airframe(), AutopilotGains(), rotors,
-    )  # fmt: skip
+    X_WB = np.ascontiguousarray(np.eye(3, 4))
+    command, twist = np.zeros(7), np.zeros(6)
+    pilot(np.zeros(MEMORY + 5), command, X_WB, twist, 0.01, Airframe(), AutopilotGains())

@@ -18,6 +18,9 @@ class FlightLimits(NamedTuple):
     max_descent_speed: float = 0.6
     max_yaw_rate: float = 1.2
     max_acceleration: float = 1.5
+    """Of a setpoint on its way."""
+    max_braking: float = 3.0
+    """With which the governor stops it, and turns it at corners."""
     period: float = 0.05
     """Seconds for which a setpoint is held."""
 
@@ -49,9 +52,11 @@ class AutopilotGains(NamedTuple):
     """Velocity by position error, 1/s."""
     velocity_p: float = 3.6
     """Acceleration by velocity error, 1/s."""
-    velocity_i: float = 1.8
+    velocity_i: float = 1.2
     """1/s^2."""
     velocity_d: float = 0.15
+    lead_time: float = 0.15
+    """Over which the setpoint's own acceleration is taken, seconds."""
     attitude: float = 8.0
     """Body rate by attitude error, 1/s."""
     yaw_weight: float = 0.4

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, LeafSystem
 
+from unilavira_drake.kernels import kernel
 from unilavira_drake.ports import vector_input
 
 
@@ -32,6 +35,7 @@ class FloatingBase(LeafSystem):
     def __init__(self) -> None:
         super().__init__()
         self.set_name("floating_base")
+        twist_in_body(np.array([1.0, *np.zeros(12)]))
         self._body_state = vector_input(self, "body_state", 13)
         self.DeclareAbstractOutputPort(
             "pose", lambda: AbstractValue.Make(RigidTransform()), self._calc_pose
@@ -44,10 +48,25 @@ class FloatingBase(LeafSystem):
 
     def _calc_twist(self, context: Any, output: Any) -> None:
         state: Any = self._body_state(context)
-        R_BW = _rotation(state[:4]).matrix().T
-        output.SetFromVector(np.concatenate((R_BW @ state[7:10], R_BW @ state[10:13])))
+        output.SetFromVector(twist_in_body(np.array(state)))
+
+
+@kernel
+def twist_in_body(body_state: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns [w; v] of a floating body, expressed in its own frame; (6,)."""
+    q = body_state[:4] / math.sqrt(np.sum(body_state[:4] ** 2))
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    out = np.empty(6)
+    for k in (0, 3):
+        a, b, c = body_state[7 + k], body_state[8 + k], body_state[9 + k]
+        # v + 2 q x (q x v - w v), the rotation by the inverse quaternion.
+        s, t, u = y * c - z * b - w * a, z * a - x * c - w * b, x * b - y * a - w * c
+        out[k] = a + 2.0 * (y * u - z * t)
+        out[k + 1] = b + 2.0 * (z * s - x * u)
+        out[k + 2] = c + 2.0 * (x * t - y * s)
+    return out
 
 
 def _rotation(wxyz: Any) -> RotationMatrix:
     # The integration of a discrete plant leaves the quaternion a little longer or shorter than 1.
-    return RotationMatrix(Quaternion(wxyz / np.linalg.norm(wxyz)))
+    return RotationMatrix(Quaternion(wxyz / math.sqrt(wxyz @ wxyz)))

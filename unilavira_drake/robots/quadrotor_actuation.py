@@ -6,20 +6,27 @@ import math
 from typing import Any
 
 import numpy as np
+from pydrake.geometry import Box
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import MultibodyPlant, Propeller, PropellerInfo
+from pydrake.multibody.plant import (
+    CoulombFriction,
+    MultibodyPlant,
+    Propeller,
+    PropellerInfo,
+)
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import DiagramBuilder, System
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import LinearSystem, MatrixGain
 
 from unilavira_drake.robots.flight_autopilot import FlightAutopilot
-from unilavira_drake.robots.flight_limits import Airframe, AutopilotGains
+from unilavira_drake.robots.flight_limits import GRAVITY, Airframe, AutopilotGains
 from unilavira_drake.robots.floating_base import FloatingBase
 from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.robots.rotor_mixer import ROTOR_MOMENT, ROTOR_X, ROTOR_Y
-from unilavira_drake.robots.wind import Wind, WindModel
+from unilavira_drake.robots.wind import STILL_AIR, Wind, WindModel
 
-STILL_AIR = WindModel()
+GROUND_SIDE = 4000.0
+"""Metres."""
 
 
 def add_quadrotor_actuation(
@@ -29,11 +36,11 @@ def add_quadrotor_actuation(
     robot: Quadrotor,
     *,
     wind: WindModel = STILL_AIR,
-) -> None:
-    """Adds the autopilot, rotors with lag, propellers, drag and wind, and exports the ports.
+) -> tuple[OutputPort, OutputPort, InputPort]:
+    """Adds the autopilot, rotors with lag, propellers, drag and wind.
 
-    ``base_command`` [x, y, z, yaw, vx, vy, vz] in; ``pose_estimate``, ``twist`` and
-    ``cheat_X_WB`` out.  It takes the plant's ports for applied forces.
+    Exports the input ``base_command`` [x, y, z, yaw, vx, vy, vz].  It takes the plant's ports for
+    applied forces.
 
     Args:
         builder: of the station.
@@ -41,6 +48,9 @@ def add_quadrotor_actuation(
         model_instance: the aircraft.
         robot: its configuration.
         wind: the air around it.
+
+    Returns:
+        The ports of the true pose X_WB and of the twist, and the autopilot's for its pose estimate.
     """
     base = builder.AddSystem(FloatingBase())
     state = plant.get_state_output_port(model_instance)
@@ -53,14 +63,12 @@ def add_quadrotor_actuation(
             period=robot.autopilot_period,
         ),
     )
-    builder.Connect(base.GetOutputPort("pose"), autopilot.GetInputPort("pose_estimate"))
     builder.Connect(base.GetOutputPort("twist"), autopilot.GetInputPort("twist"))
     _add_rotors(builder, plant, model_instance, robot, autopilot)
     _add_air(builder, plant, model_instance, robot, wind)
     builder.ExportInput(autopilot.GetInputPort("base_command"), "base_command")
-    builder.ExportOutput(base.GetOutputPort("pose"), "pose_estimate")
-    builder.ExportOutput(base.GetOutputPort("twist"), "twist")
-    builder.ExportOutput(base.GetOutputPort("pose"), "cheat_X_WB")
+    estimate = autopilot.GetInputPort("pose_estimate")
+    return base.GetOutputPort("pose"), base.GetOutputPort("twist"), estimate
 
 
 def airframe_of(
@@ -80,10 +88,36 @@ def airframe_of(
     )
 
 
-def standing_pose(robot: Quadrotor, x: float, y: float, yaw: float) -> RigidTransform:
-    """Returns X_WB of the aircraft standing on a floor at z = 0."""
-    p_WB: Any = np.array([x, y, robot.standing_height])
-    return RigidTransform(RotationMatrix.MakeZRotation(yaw), p_WB)
+def add_landing_ground(plant: MultibodyPlant) -> None:
+    """Adds ground at z = 0 to stand on, which nobody sees; a robot on wheels needs none."""
+    p_WG: Any = np.array([0.0, 0.0, -0.5])
+    slab = Box(GROUND_SIDE, GROUND_SIDE, 1.0)
+    friction = CoulombFriction(0.9, 0.8)
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform(p_WG), slab, "landing_ground", friction
+    )
+
+
+def set_flight_start(
+    plant: MultibodyPlant,
+    model_instance: ModelInstanceIndex,
+    robot: Quadrotor,
+    start: tuple[float, float, float],
+    height: float = 0.0,
+) -> None:
+    """Sets the default pose: in the air, or standing on a floor at z = 0.
+
+    Args:
+        plant: finalized.
+        model_instance: the aircraft.
+        robot: its configuration.
+        start: x, y (metres) and yaw (radians).
+        height: of the centre, metres; it stands where that is lower than its skids.
+    """
+    x, y, yaw = start
+    p_WB: Any = np.array([x, y, max(height, robot.standing_height)])
+    X_WB = RigidTransform(RotationMatrix.MakeZRotation(yaw), p_WB)
+    plant.SetDefaultFloatingBaseBodyPose(plant.GetBodyByName("base", model_instance), X_WB)
 
 
 def _add_rotors(
@@ -97,17 +131,20 @@ def _add_rotors(
     step = plant.time_step()
     keep = math.exp(-step / robot.rotor_lag)
     one: Any = np.eye(4)
-    rotors = builder.AddNamedSystem(
-        "rotors", LinearSystem(keep * one, (1.0 - keep) * one, one, 0.0 * one, step)
-    )
+    lag = LinearSystem(keep * one, (1.0 - keep) * one, one, 0.0 * one, step)
+    base: Any = plant.GetBodyByName("base", model_instance)
+    height = plant.GetDefaultFloatingBaseBodyPose(base).translation()[2]
+    if height > robot.standing_height + 0.01:
+        hover: Any = np.full(4, 0.25 * base.default_mass() * GRAVITY)
+        lag.configure_default_state(hover)
+    rotors = builder.AddNamedSystem("rotors", lag)
     builder.Connect(autopilot.GetOutputPort("rotor_command"), rotors.get_input_port())
-    body = plant.GetBodyByName("base", model_instance).index()
     offset = robot.rotor_arm / math.sqrt(2.0)
     propellers = []
     for x, y, moment in zip(ROTOR_X, ROTOR_Y, ROTOR_MOMENT, strict=True):
         p_BP: Any = np.array([offset * x, offset * y, 0.0])
         ratio = moment * robot.rotor_moment_ratio
-        propellers.append(PropellerInfo(body, RigidTransform(p_BP), 1.0, ratio))
+        propellers.append(PropellerInfo(base.index(), RigidTransform(p_BP), 1.0, ratio))
     propeller: Any = builder.AddNamedSystem("propellers", Propeller(propellers))
     builder.Connect(rotors.get_output_port(), propeller.get_command_input_port())
     builder.Connect(plant.get_body_poses_output_port(), propeller.get_body_poses_input_port())
@@ -129,7 +166,7 @@ def _add_air(
             model=model,
             linear_drag=robot.linear_drag,
             quadratic_drag=robot.quadratic_drag,
-            period=robot.autopilot_period,
+            period=2.0 * robot.autopilot_period,
         )
     )
     builder.Connect(plant.get_state_output_port(model_instance), wind.GetInputPort("body_state"))

@@ -42,6 +42,9 @@ class Robot:
     views: list[str]
     # The model: a file, or package://unilavira_drake/...; empty: robots/NAME.sdf of this package.
     model: str = ""
+    # A view is captured below this speed and yaw rate.
+    rest_speed: float = 0.03
+    rest_rate: float = 0.03
 
 
 @dc.dataclass

@@ -26,6 +26,9 @@ class WindModel(NamedTuple):
     seed: int = 0
 
 
+STILL_AIR = WindModel()
+
+
 class Wind(LeafSystem):
     """The force of the air on a body: drag against its velocity relative to the wind.
 

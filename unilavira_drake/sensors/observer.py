@@ -88,7 +88,8 @@ class Observer(Level):
         views: the cameras, ``front`` among them; with ``left`` they are a ring.
         sweep_direction: ``left`` or ``right``, the side to which the robot turns to look around.
         heading_tolerance: a view is captured within this error of its heading, radians ...
-        rest_rate: ... and below this yaw rate (rad/s) and speed (m/s) ...
+        rest_rate: ... and below this yaw rate (rad/s) ...
+        rest_speed: ... and speed (m/s) ...
         view_deadline: ... or after this many seconds, at whatever heading was reached; the
             frame's pose is the true geometry, so a blocked turn costs coverage, not truth.
         max_age: after a failure a panorama that is older is captured anew though the robot has not
@@ -104,6 +105,7 @@ class Observer(Level):
         sweep_direction: str = "left",
         heading_tolerance: float = 0.02,
         rest_rate: float = 0.03,
+        rest_speed: float = 0.03,
         view_deadline: float = 8.0,
         max_age: float = math.inf,
     ) -> None:
@@ -122,6 +124,7 @@ class Observer(Level):
             self._stops = (*self._stops, last)
         self._heading_tolerance = heading_tolerance
         self._rest_rate = rest_rate
+        self._rest_speed = rest_speed
         self._view_deadline = view_deadline
         self._max_age = max_age
         self._cameras = {view: _CameraPorts(self, view) for view in (*ring, *extra)}
@@ -173,7 +176,7 @@ class Observer(Level):
         yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
         twist = self._twist(context)
         time = context.get_time()
-        at_rest = abs(twist[2]) < self._rest_rate and np.hypot(*twist[3:5]) < self._rest_rate
+        at_rest = abs(twist[2]) < self._rest_rate and np.hypot(*twist[3:5]) < self._rest_speed
         error = abs(math.remainder(yaw - state.sweep.heading, 2 * math.pi))
         on_heading = error < self._heading_tolerance or not state.sweep.active
         if not (at_rest and on_heading) and time - state.since < self._view_deadline:

@@ -1,19 +1,19 @@
 """A quadrotor over a floor, without cameras and worlds: what the flight tests fly."""
 
 import numpy as np
-from pydrake.geometry import HalfSpace
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from unilavira_drake.resources import package_xml
+from unilavira_drake.robots.actuation import add_actuation
 from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.robots.quadrotor_actuation import (
-    STILL_AIR,
-    add_quadrotor_actuation,
-    standing_pose,
+    add_landing_ground,
+    set_flight_start,
 )
+from unilavira_drake.robots.wind import STILL_AIR
 
 TIME_STEP = 0.005
 
@@ -25,14 +25,10 @@ def add_flying_body(builder, robot, wind, start=(0.0, 0.0, 0.0)):
     parser = Parser(plant)
     parser.package_map().AddPackageXml(package_xml())
     (model,) = parser.AddModelsFromUrl("package://unilavira_drake/robots/quadrotor.sdf")
-    ground = HalfSpace.MakePose([0.0, 0.0, 1.0], [0.0, 0.0, 0.0])
-    plant.RegisterCollisionGeometry(
-        plant.world_body(), ground, HalfSpace(), "floor", CoulombFriction(0.9, 0.8)
-    )
+    add_landing_ground(plant)
     plant.Finalize()
-    body = plant.GetBodyByName("base", model)
-    plant.SetDefaultFloatingBaseBodyPose(body, standing_pose(robot, *start))
-    add_quadrotor_actuation(builder, plant, model, robot, wind=wind)
+    set_flight_start(plant, model, robot, start)
+    add_actuation(builder, plant, model, robot, wind=wind)
 
 
 class Flight:

@@ -1,0 +1,148 @@
+"""B1 and B2 of the quadrotor: how fast a flight is simulated, and how well the path is kept.
+
+    python benchmarks/robots_flight.py [--flights 2]
+
+Prints one JSON object a line.  A flight is the whole diagram in ``apartment``, from room to room
+through the doors, in gusts: plant with the world's collision geometry, five cameras, observer,
+agent (the ``fixed`` model, without latency), navigation and monitor.  Only the goals are given.
+
+* ``B1``: simulated seconds per CPU second in the half seconds in which the aircraft moved, without
+  rendering.
+* ``B2``: distance of the true position from the path that is flown, in 3-D, at each twentieth of
+  a second on the way; 95th percentile, metres.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from typing import Any
+from unittest import mock
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue
+from pydrake.systems.analysis import Simulator, SimulatorStatus
+from pydrake.systems.framework import LeafSystem
+
+from unilavira_drake import load_scenario
+from unilavira_drake.diagram import make_navigation_diagram
+from unilavira_drake.messages import Goal, History, LanguageAction, Panorama, VisionAction
+from unilavira_drake.ports import message_input
+from unilavira_drake.raster.renderer import RasterRenderer
+
+OVERLAY = """
+robot: !Quadrotor {}
+language_model: fixed
+vision_model: fixed
+flight: {wind: {speed: 0.4, gusts: 0.6}}
+"""
+ROUTE = (
+    (2.9, 5.6, 1.2),
+    (9.8, 5.6, 1.6),
+    (9.8, 8.2, 1.3),
+    (9.8, 5.6, 1.2),
+    (14.5, 5.6, 1.5),
+    (13.65, 3.6, 1.1),
+    (9.8, 5.6, 1.4),
+    (2.9, 5.6, 1.0),
+)
+"""Goals in rooms and corridor, metres; the start is in a bedroom."""
+CHUNK, SAMPLE = 0.5, 0.05
+"""Simulated seconds in which the aircraft moved or did not, and between two samples."""
+MOVED = 0.1
+"""Metres in a chunk that count as motion."""
+
+
+class Route(LeafSystem):
+    """In the place of the goal selector: whatever the model says, the next goal of the route."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        message_input(self, "vision_action", VisionAction())
+        message_input(self, "history", History())
+        self._panorama = message_input(self, "panorama", Panorama())
+        self._action = message_input(self, "language_action", LanguageAction())
+        self.DeclareAbstractOutputPort("goal", lambda: AbstractValue.Make(Goal()), self._calc_goal)
+
+    def _calc_goal(self, context: Any, output: Any) -> None:
+        n = self._action(context).n
+        known = 0 < n == self._panorama(context).n
+        point = ROUTE[(n - 1) % len(ROUTE)]
+        output.set_value(Goal(n, "go", point) if known else Goal())
+
+
+def off_path(p_WP: NDArray[np.float64], p: NDArray[np.float64]) -> float:
+    """Returns the distance of a point to a (k, 3) polyline, metres."""
+    a, step = p_WP[:-1], np.diff(p_WP, axis=0)
+    share = np.sum((p - a) * step, axis=1) / np.maximum(np.sum(step * step, axis=1), 1e-12)
+    nearest = a + np.clip(share, 0.0, 1.0)[:, None] * step
+    return float(np.linalg.norm(p - nearest, axis=1).min())
+
+
+def fly(seed: int) -> dict[str, float]:
+    """Flies the route once and returns what was measured."""
+    scenario = load_scenario("apartment", f"{OVERLAY}\nrandom_seed: {seed}")
+    drawing, draw = [0.0], RasterRenderer.draw
+
+    def timed(*arguments: Any, **options: Any) -> Any:
+        begun = time.process_time()
+        try:
+            return draw(*arguments, **options)
+        finally:
+            drawing[0] += time.process_time() - begun
+
+    with mock.patch.object(RasterRenderer, "draw", timed):
+        diagram = make_navigation_diagram(scenario, replace={"goal_selector": Route()})
+        simulator = Simulator(diagram)
+        return _watched(simulator, diagram, drawing)
+
+
+def _watched(simulator: Simulator, diagram: Any, drawing: list[float]) -> dict[str, float]:
+    root = simulator.get_context()
+
+    def output(part: str, port: str) -> Any:
+        system = diagram.GetSubsystemByName(part)
+        return system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(root))
+
+    errors, moving, cpu, way = [], 0.0, 0.0, 0.0
+    last = np.array(output("station", "cheat_X_WB").translation())
+    while output("navigation", "navigation_status").n < len(ROUTE):
+        begun, drawn, at = time.process_time(), drawing[0], last
+        spent = 0.0
+        for _ in range(round(CHUNK / SAMPLE)):
+            begun = time.process_time()
+            reason = simulator.AdvanceTo(root.get_time() + SAMPLE).reason()
+            spent += time.process_time() - begun
+            if reason == SimulatorStatus.ReturnReason.kReachedTerminationCondition:
+                raise RuntimeError(output("episode_monitor", "metrics").cause)
+            last = np.array(output("station", "cheat_X_WB").translation())
+            path = output("navigation", "path").p_WP
+            if len(path) > 1:
+                errors.append(off_path(path, last))
+        step = float(np.linalg.norm(last - at))
+        if step >= MOVED:
+            moving += CHUNK
+            way += step
+            cpu += spent - (drawing[0] - drawn)
+    return {
+        "simulated_s_per_cpu_s": moving / cpu,
+        "moving_s": moving,
+        "way_m": way,
+        "off_path_p95_m": float(np.percentile(errors, 95)),
+        "off_path_max_m": max(errors),
+        "collisions": output("episode_monitor", "metrics").collisions,
+    }
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--flights", type=int, default=2)
+    flights = [fly(seed) for seed in range(parser.parse_args().flights)]
+    for row in flights:
+        print(json.dumps({"flight": {key: round(value, 3) for key, value in row.items()}}))
+    speed = float(np.median([row["simulated_s_per_cpu_s"] for row in flights]))
+    worst = max(row["off_path_p95_m"] for row in flights)
+    print(json.dumps({"id": "B1.quadrotor", "value": round(speed, 1), "target": ">= 40"}))
+    print(json.dumps({"id": "B2.quadrotor", "value": round(worst, 3), "target": "<= 0.20"}))

@@ -1,0 +1,119 @@
+"""The reference along a path in the air: on the path, within the limits, at rest at its end."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from unilavira_drake.robots.flight_limits import FlightLimits
+from unilavira_drake.robots.flight_path_following import CORNER, corner_speed, follow, hold
+
+LIMITS = FlightLimits()
+POINT = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.5, 4))
+
+
+def flown(path, *, start=None, yaw=0.0, ticks=1500):
+    """Rolls the reference out with an aircraft that is always where it should be."""
+    path = np.array(path, float)
+    reference = np.array([*(path[0] if start is None else start), yaw, 0.0, 0.0, 0.0])
+    rows, travelled = [reference], math.nan
+    for _ in range(ticks):
+        *moved, travelled = follow(
+            path, reference, reference[:3], reference[3], travelled, 4.0, LIMITS
+        )
+        reference = np.array(moved)
+        rows.append(reference)
+        if np.allclose(reference[:3], path[-1], atol=1e-6) and not reference[4:].any():
+            break
+    return np.array(rows)
+
+
+def distance_to(path, points):
+    path = np.array(path, float)
+    best = np.full(len(points), np.inf)
+    for a, b in itertools.pairwise(path):
+        step = b - a
+        share = np.clip((points - a) @ step / max(step @ step, 1e-12), 0, 1)
+        best = np.minimum(best, np.linalg.norm(points - a - np.outer(share, step), axis=1))
+    return best
+
+
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(st.lists(POINT, min_size=2, max_size=6))
+def test_it_stays_on_the_path_and_within_its_limits_and_reaches_the_end(path):
+    rows = flown(path)
+    assert distance_to(path, rows[:, :3]).max() < 1e-6
+    assert np.hypot(rows[:, 4], rows[:, 5]).max() <= LIMITS.max_speed + 1e-6
+    assert rows[:, 6].max() <= LIMITS.max_climb_speed + 1e-6
+    assert rows[:, 6].min() >= -LIMITS.max_descent_speed - 1e-6
+    speed = np.linalg.norm(rows[:, 4:], axis=1)
+    assert np.diff(speed).max() <= LIMITS.max_acceleration * LIMITS.period + 1e-9
+    yaw_rate = np.abs(np.diff(rows[:, 3])) / LIMITS.period
+    assert yaw_rate.max() <= LIMITS.max_yaw_rate + 1e-9
+    np.testing.assert_allclose(rows[-1, :3], path[-1], atol=0.02)
+
+
+def test_a_straight_way_takes_the_time_of_a_trapezoid():
+    rows = flown([(0, 0, 1), (6, 0, 1)])
+    a = 0.8 * LIMITS.max_acceleration
+    expected = 6.0 / (0.9 * LIMITS.max_speed) + 0.9 * LIMITS.max_speed / a
+    assert len(rows) * LIMITS.period == pytest.approx(expected, abs=0.5)
+
+
+def test_the_speed_at_a_corner_is_that_of_an_arc_within_the_deviation():
+    """The arc that touches both legs and passes the corner at CORNER: v^2 = a r."""
+    for turn in (0.3, 1.0, 2.0, 3.0):
+        before = np.array([1.0, 0.0, 0.0])
+        after = np.array([math.cos(turn), math.sin(turn), 0.0])
+        radius = CORNER / (1.0 / math.cos(turn / 2.0) - 1.0)
+        assert corner_speed(before, after, 1.2) == pytest.approx(math.sqrt(1.2 * radius), rel=1e-6)
+
+
+def test_it_slows_down_for_a_corner_it_cannot_yet_feel():
+    rows = flown([(0, 0, 1), (4, 0, 1), (4, 4, 1)])
+    at_corner = np.argmin(np.linalg.norm(rows[:, :3] - [4, 0, 1], axis=1))
+    speed = np.linalg.norm(rows[:, 4:], axis=1)
+    assert speed.max() > 0.88
+    assert speed[at_corner] < 0.65
+
+
+def test_it_turns_its_nose_before_it_flies_that_way():
+    rows = flown([(0, 0, 1), (0, -5, 1)], yaw=1.5)
+    first = np.argmax(np.linalg.norm(rows[:, 4:], axis=1) > 0.05)
+    assert abs(rows[first, 3] + math.pi / 2) < 1.3
+    assert rows[-1, 3] == pytest.approx(-math.pi / 2, abs=0.05)
+
+
+def test_it_rises_on_the_spot_without_turning():
+    rows = flown([(1, 1, 0.2), (1, 1, 3)], yaw=0.7)
+    np.testing.assert_allclose(rows[:, 3], 0.7)
+
+
+def test_it_goes_once_round_a_closed_path():
+    path = [(0, 0, 1), (3, 0, 1), (3, 3, 1), (0, 3, 1), (0, 0, 1)]
+    rows = flown(path)
+    length = np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1).sum()
+    assert length == pytest.approx(12.0, abs=0.3)
+
+
+def test_it_waits_for_an_aircraft_that_is_held_up():
+    path = np.array([(0.0, 0, 1), (9.0, 0, 1)])
+    reference, travelled = np.array([0.0, 0, 1, 0, 0, 0, 0]), math.nan
+    for _ in range(400):
+        *moved, travelled = follow(path, reference, np.array([0.0, 0, 1]), 0.0, travelled, 4.0,
+                                   LIMITS)  # fmt: skip
+        reference = np.array(moved)
+    assert reference[0] <= 1.05
+    assert abs(reference[4]) < 1e-3
+
+
+def test_without_a_path_it_comes_to_rest_and_turns():
+    reference = np.array([0.0, 0, 1, 0, 1.0, 0, 0])
+    for _ in range(100):
+        reference = hold(reference, 2.0, 4.0, LIMITS)
+    assert reference[0] == pytest.approx(1.0 / (2 * 0.8 * 1.5), abs=0.05)
+    assert reference[3] == pytest.approx(2.0, abs=1e-3)
+    assert not reference[4:].any()

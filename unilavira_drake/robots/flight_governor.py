@@ -1,0 +1,156 @@
+"""The flight governor: the last word before the autopilot."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+
+from unilavira_drake.messages import VoxelMap
+from unilavira_drake.ports import message_input, pose_input, vector_input
+from unilavira_drake.robots.flight_limits import FlightLimits
+from unilavira_drake.robots.flight_stopping import braked, free_flight, next_yaw, warm_up, wished
+from unilavira_drake.robots.stopping import stoppable_speed
+
+LEASH = 1.5
+"""The setpoint is never farther from the aircraft than this, metres."""
+
+
+class FlightGovernor(LeafSystem):
+    """Lets an aircraft fly only to what is finite, fresh, within its limits, fenced and free ahead.
+
+    * The setpoint moves after the desired one within the limits of speed, acceleration and yaw
+      rate, and never leaves the fence; an aircraft that is outside may come back.
+    * A desired setpoint that is not finite, or older than ``command_timeout``, and a map older
+      than ``map_timeout``, end in hovering: the setpoint brakes and stays.  So does whatever
+      takes long to answer: without a path the setpoint rests, however late a reply may be.
+    * The setpoint moves only so fast that it still stops, after v^2 / 2a and one period, before
+      the aircraft around it meets an occupied voxel.
+    * The aircraft may always turn on the spot.
+
+    The state is the setpoint.  It is NaN until pose and command are known, and finite ever after.
+
+    .. pydrake_system::
+
+        name: FlightGovernor
+        input_ports:
+        - desired_command
+        - map
+        - pose_estimate
+        - twist
+        output_ports:
+        - base_command
+
+    ``base_command`` is (7,) float64: x, y, z, yaw, vx, vy, vz in the world, metres, radians, m/s.
+
+    Args:
+        limits: of the aircraft; the update period is among them.
+        radius: kept free around the setpoint in the direction of flight, metres.
+        fence: (2, 3), lowest and highest x, y, z of the setpoint, metres.
+        offset: time of the first update, seconds; a little after the controller's.
+        standoff: that stays free before the aircraft, for what it lags and wavers, metres.
+        command_timeout: seconds.
+        map_timeout: seconds; longer than a mapper's period at rest.
+    """
+
+    def __init__(
+        self,
+        *,
+        limits: FlightLimits,
+        radius: float,
+        fence: NDArray[np.float64],
+        offset: float = 0.005,
+        standoff: float = 0.1,
+        command_timeout: float = 0.3,
+        map_timeout: float = 3.0,
+    ) -> None:
+        super().__init__()
+        warm_up()
+        self._limits = limits
+        self._radius = radius
+        self._fence = np.array(fence, np.float64)
+        self._standoff = standoff
+        self._command_timeout = command_timeout
+        self._map_timeout = map_timeout
+        self._desired = vector_input(self, "desired_command", 8)
+        self._map = message_input(self, "map", VoxelMap())
+        self._pose = pose_input(self, "pose_estimate")
+        # The ports of a governor are the same on the ground and in the air.
+        vector_input(self, "twist", 6)
+        unknown: Any = np.full(7, np.nan)
+        index = self.DeclareDiscreteState(unknown)
+        self._setpoint_index = int(index)
+        self.DeclareStateOutputPort("base_command", index)
+        self.DeclarePeriodicDiscreteUpdateEvent(limits.period, offset, self._update)
+
+    def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
+        desired: Any = self._desired(context)
+        old: Any = context.get_discrete_state(self._setpoint_index).value()
+        fresh = abs(context.get_time() - desired[7]) <= self._command_timeout
+        valid = bool(fresh and np.isfinite(desired).all())
+        p_WB = self._pose(context).translation()
+        if math.isnan(old[0]):
+            if not (valid and np.isfinite(p_WB).all()):
+                return
+            old = np.array([*p_WB, desired[3], 0.0, 0.0, 0.0])
+        elif valid and np.array_equal(old, desired[:7]) and not old[4:].any():
+            return
+        setpoint = np.array(old)
+        if np.isfinite(p_WB).all():
+            behind = setpoint[:3] - p_WB
+            distance = math.sqrt(float(behind @ behind))
+            if distance > LEASH:
+                setpoint[:3] = p_WB + behind * (LEASH / distance)
+        v = self._velocity(context, setpoint, np.array(desired[:7]) if valid else None)
+        setpoint[4:] = v
+        setpoint[:3] += self._limits.period * v
+        if valid:
+            setpoint[3] = next_yaw(setpoint[3], float(desired[3]), self._limits)
+        discrete_state.set_value(self._setpoint_index, setpoint)  # type: ignore[arg-type]
+
+    def _velocity(
+        self, context: Context, setpoint: NDArray[np.float64], desired: NDArray[np.float64] | None
+    ) -> NDArray[np.float64]:
+        """Returns how the setpoint may move for one period, m/s."""
+        limits = self._limits
+        slower = braked(setpoint[4:], limits.max_braking, limits.period)
+        if desired is None:
+            return slower
+        v = wished(setpoint, desired, self._fence, limits)
+        speed = math.sqrt(float(v @ v))
+        if speed == 0.0:
+            return v
+        map_ = self._map(context)
+        if context.get_time() - map_.time > self._map_timeout:
+            return slower
+        allowed = self._allowed_speed(map_, setpoint[:3], v / speed, speed)
+        if allowed >= speed:
+            return v
+        v = v * (allowed / speed)
+        change = v - setpoint[4:]
+        # What cannot be had by braking within the limits is not worth a jump: brake straight on.
+        possible = float(change @ change) <= (limits.max_braking * limits.period) ** 2 + 1e-12
+        return v if possible else slower
+
+    def _allowed_speed(
+        self,
+        map_: VoxelMap,
+        p: NDArray[np.float64],
+        direction: NDArray[np.float64],
+        speed: float,
+    ) -> float:
+        limits = self._limits
+        stopping = speed**2 / (2.0 * limits.max_braking) + speed * limits.period
+        horizon = stopping + self._standoff
+        end = p + horizon * direction
+        reach = self._radius + map_.resolution
+        low = np.floor((np.minimum(p, end) - reach) / map_.resolution).astype(np.int64)
+        high = np.floor((np.maximum(p, end) + reach) / map_.resolution).astype(np.int64) + 1
+        window = map_.window(tuple(low.tolist()), tuple(high.tolist()))
+        free = free_flight(window, low, map_.resolution, p, direction, horizon, self._radius)
+        if free >= horizon:
+            return speed
+        return float(stoppable_speed(free - self._standoff, limits.max_braking, limits.period))

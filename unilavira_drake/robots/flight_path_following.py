@@ -1,0 +1,207 @@
+"""A reference that flies along a path in the air: where it is next, how fast, and its heading.
+
+The reference stays on the path and never outruns the aircraft: it slows down for corners, for the
+end, for climbs, while the aircraft lags behind, and while the nose does not yet point ahead.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.kernels import kernel
+from unilavira_drake.messages import read_only
+from unilavira_drake.robots.drive_limits import approach, braking_speed
+from unilavira_drake.robots.flight_limits import FlightLimits
+
+SHARE = 0.8
+"""Share of the acceleration that the reference uses; the rest is the governor's."""
+CRUISE = 0.9
+"""Share of the greatest speed at which the reference flies; what comes after it can catch up."""
+CORNER = 0.08
+"""A corner is flown so slowly that the turn fits into this deviation, metres."""
+SLOWEST = 0.05
+"""Even a turn on the spot is passed at this speed, m/s."""
+LAG = 0.5
+"""The reference slows down when the aircraft is farther behind than this and waits at twice as
+much, metres."""
+FREE_ANGLE = 0.4
+STOP_ANGLE = 1.2
+"""It slows down when the nose is farther off the way ahead than the one, and waits at the other,
+radians."""
+LOOKAHEAD_TIME = 1.0
+MIN_LOOKAHEAD = 0.5
+"""The nose points to where the reference will be after that time, at least so many metres on."""
+
+
+@kernel
+def project(p_WP: NDArray[np.float64], p: NDArray[np.float64]) -> float:
+    """Returns how far along a (k, 3) polyline its point nearest to p is, metres."""
+    nearest, best, before = 0.0, np.inf, 0.0
+    for i in range(max(len(p_WP) - 1, 1)):
+        step = p_WP[min(i + 1, len(p_WP) - 1)] - p_WP[i]
+        length = math.sqrt(np.sum(step * step))
+        s = min(max(np.sum((p - p_WP[i]) * step) / max(length, 1e-9), 0.0), length)
+        off = p - p_WP[i] - step * (s / max(length, 1e-9))
+        distance = math.sqrt(np.sum(off * off))
+        if distance < best - 1e-9:
+            nearest, best = before + s, distance
+        before += length
+    return nearest
+
+
+@kernel
+def locate(p_WP: NDArray[np.float64], travelled: float) -> tuple[int, float]:
+    """Returns the segment of a polyline that lies so far along it, and the metres along that."""
+    along = travelled
+    for i in range(len(p_WP) - 1):
+        step = p_WP[i + 1] - p_WP[i]
+        length = math.sqrt(np.sum(step * step))
+        if along < length:
+            return i, along
+        along -= length
+    return len(p_WP) - 1, 0.0
+
+
+@kernel
+def advance(
+    p_WP: NDArray[np.float64], segment: int, along: float, distance: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns the point of a polyline so far beyond another, and the direction there.
+
+    Past the end it is the end, and the direction zero.
+    """
+    s = along + distance
+    for i in range(segment, len(p_WP) - 1):
+        step = p_WP[i + 1] - p_WP[i]
+        length = math.sqrt(np.sum(step * step))
+        if s < length:
+            return p_WP[i] + step * (s / length), step / length
+        s -= length
+    return p_WP[-1].copy(), np.zeros(3)
+
+
+@kernel
+def speed_along(direction: NDArray[np.float64], limits: FlightLimits) -> float:
+    """Returns the speed at which to cruise in a direction (a unit vector), m/s."""
+    level = math.hypot(direction[0], direction[1])
+    speed: float = limits.max_speed / max(level, 1e-6)
+    vertical = limits.max_climb_speed if direction[2] > 0.0 else limits.max_descent_speed
+    return CRUISE * min(speed, float(vertical / max(abs(direction[2]), 1e-6)))
+
+
+@kernel
+def corner_speed(
+    before: NDArray[np.float64], after: NDArray[np.float64], acceleration: float
+) -> float:
+    """Returns the speed at which the turn between two directions fits into the deviation, m/s."""
+    cosine = min(max(-np.sum(before * after), -1.0), 1.0)
+    half = math.sqrt(0.5 * (1.0 - cosine))
+    return max(math.sqrt(acceleration * CORNER * half / max(1.0 - half, 1e-9)), SLOWEST)
+
+
+@kernel
+def _speed_ahead(
+    p_WP: NDArray[np.float64], segment: int, along: float, acceleration: float, limits: FlightLimits
+) -> float:
+    """Returns the speed from which every corner, slope and the end can still be met, m/s."""
+    speed, distance = np.inf, -along
+    before = np.zeros(3)
+    for i in range(segment, len(p_WP) - 1):
+        step = p_WP[i + 1] - p_WP[i]
+        length = math.sqrt(np.sum(step * step))
+        if length < 1e-9:
+            continue
+        direction = step / length
+        bound = speed_along(direction, limits)
+        if distance > 0.0:
+            bound = min(bound, corner_speed(before, direction, acceleration))
+            bound = math.sqrt(bound**2 + 2.0 * acceleration * distance)
+        speed = min(speed, bound)
+        before = direction
+        distance += length
+        if acceleration * distance > 0.5 * speed**2 + speed:
+            return speed
+    return min(speed, braking_speed(max(distance, 0.0), acceleration, limits.period))
+
+
+@kernel
+def turned(yaw: float, heading: float, max_yaw_acceleration: float, limits: FlightLimits) -> float:
+    """Returns the yaw one period later on the way to a heading, where it comes to rest."""
+    error = math.atan2(math.sin(heading - yaw), math.cos(heading - yaw))
+    rate = min(braking_speed(abs(error), max_yaw_acceleration, limits.period), limits.max_yaw_rate)
+    return yaw + math.copysign(rate * limits.period, error)
+
+
+@kernel
+def follow(
+    p_WP: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    p_WB: NDArray[np.float64],
+    yaw: float,
+    travelled: float,
+    max_yaw_acceleration: float,
+    limits: FlightLimits,
+) -> NDArray[np.float64]:
+    """Returns the next reference on a path: x, y, z, yaw, vx, vy, vz, and metres travelled; (8,).
+
+    Args:
+        p_WP: (k, 3) float64, k >= 1, metres in the world.
+        reference: (7,) the one before.
+        p_WB: (3,) where the aircraft is, metres.
+        yaw: of the aircraft, radians.
+        travelled: how far along this path the one before is, metres; NaN: where it is nearest.
+        max_yaw_acceleration: rad/s^2.
+        limits: of the aircraft.
+    """
+    acceleration = SHARE * limits.max_acceleration
+    if math.isnan(travelled):
+        travelled = project(p_WP, reference[:3])
+    segment, along = locate(p_WP, travelled)
+    previous = math.sqrt(np.sum(reference[4:7] ** 2))
+    speed = _speed_ahead(p_WP, segment, along, acceleration, limits)
+    behind = math.sqrt(np.sum((reference[:3] - p_WB) ** 2))
+    speed = min(speed, limits.max_speed * min(max(2.0 - behind / LAG, 0.0), 1.0))
+    ahead, _ = advance(p_WP, segment, along, max(previous * LOOKAHEAD_TIME, MIN_LOOKAHEAD))
+    way = ahead - reference[:3]
+    heading = reference[3]
+    if math.hypot(way[0], way[1]) > max(0.3 * abs(way[2]), 0.05):
+        heading = math.atan2(way[1], way[0])
+        off = abs(math.atan2(math.sin(heading - yaw), math.cos(heading - yaw)))
+        share = (STOP_ANGLE - off) / (STOP_ANGLE - FREE_ANGLE)
+        speed = min(speed, limits.max_speed * min(max(share, 0.0), 1.0))
+    slower = limits.max_acceleration * limits.period
+    speed = min(max(speed, previous - slower), previous + SHARE * slower)
+    point, direction = advance(p_WP, segment, along, speed * limits.period)
+    out = np.empty(8)
+    out[:3] = point
+    out[3] = turned(reference[3], heading, max_yaw_acceleration, limits)
+    out[4:7] = min(speed, speed_along(direction, limits)) * direction
+    out[7] = travelled + speed * limits.period
+    return out
+
+
+@kernel
+def hold(
+    reference: NDArray[np.float64],
+    heading: float,
+    max_yaw_acceleration: float,
+    limits: FlightLimits,
+) -> NDArray[np.float64]:
+    """Returns the next reference of an aircraft that comes to rest and turns to a heading; (7,)."""
+    out = np.empty(7)
+    speed = math.sqrt(np.sum(reference[4:7] ** 2))
+    slower = approach(speed, 0.0, SHARE * limits.max_acceleration * limits.period)
+    out[4:7] = reference[4:7] * (slower / speed if speed > 0.0 else 0.0)
+    out[:3] = reference[:3] + limits.period * out[4:7]
+    out[3] = turned(reference[3], heading, max_yaw_acceleration, limits)
+    return out
+
+
+def warm_up() -> None:
+    """Compiles the kernels, or loads them from numba's cache."""
+    limits, reference = FlightLimits(), np.zeros(7)
+    follow(read_only(np.zeros((2, 3))), reference, np.zeros(3), 0.0, np.nan, 1.0, limits)
+    hold(reference, 0.0, 1.0, limits)

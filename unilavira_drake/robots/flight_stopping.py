@@ -1,0 +1,122 @@
+"""How far an aircraft may fly before it is too near to something, and how it comes to rest."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.kernels import kernel
+from unilavira_drake.robots.drive_limits import approach, braking_speed
+from unilavira_drake.robots.flight_limits import FlightLimits
+
+
+@kernel
+def free_flight(
+    log_odds: NDArray[np.int8],
+    low: NDArray[np.int64],
+    resolution: float,
+    p: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    horizon: float,
+    radius: float,
+) -> float:
+    """Returns how far a ball may fly straight before it meets an occupied voxel, metres.
+
+    A voxel is taken for a ball of its own half side.  What lies behind is no hindrance, nor is
+    what the ball already touches and leaves.  Unknown voxels count as free: the planner keeps to
+    what was seen.
+
+    Args:
+        log_odds: int8 of a window of voxels; positive is occupied.
+        low: (3,) int64, the voxel of ``log_odds[0, 0, 0]``.
+        resolution: side of a voxel, metres.
+        p: (3,) where the ball is, metres.
+        direction: (3,) unit vector.
+        horizon: metres; returned when nothing is met within it.
+        radius: of the ball, metres.
+    """
+    reach = radius + 0.5 * resolution
+    best = horizon
+    for x in range(log_odds.shape[0]):
+        for y in range(log_odds.shape[1]):
+            for z in range(log_odds.shape[2]):
+                if log_odds[x, y, z] <= 0:
+                    continue
+                qx = (low[0] + x + 0.5) * resolution - p[0]
+                qy = (low[1] + y + 0.5) * resolution - p[1]
+                qz = (low[2] + z + 0.5) * resolution - p[2]
+                ahead = qx * direction[0] + qy * direction[1] + qz * direction[2]
+                if ahead <= 0.0:
+                    continue
+                aside = qx * qx + qy * qy + qz * qz - ahead * ahead
+                if aside < reach * reach:
+                    best = min(best, max(ahead - math.sqrt(reach * reach - aside), 0.0))
+    return best
+
+
+@kernel
+def braked(v: NDArray[np.float64], deceleration: float, period: float) -> NDArray[np.float64]:
+    """Returns a velocity one period of braking later, in its own direction; (3,) m/s."""
+    speed = math.sqrt(np.sum(v * v))
+    if speed <= 0.0:
+        return np.zeros(3)
+    return v * (max(speed - deceleration * period, 0.0) / speed)
+
+
+@kernel
+def wished(
+    setpoint: NDArray[np.float64],
+    desired: NDArray[np.float64],
+    fence: NDArray[np.float64],
+    limits: FlightLimits,
+) -> NDArray[np.float64]:
+    """Returns the velocity that takes a setpoint after the desired one; (3,) m/s.
+
+    It is within the limits of speed and acceleration, and such that the setpoint comes to rest
+    before it leaves the fence; outside it only comes back.
+
+    Args:
+        setpoint: (7,) the latest.
+        desired: (7,) what the controller wants.
+        fence: (2, 3) lowest and highest x, y, z, metres.
+        limits: of the aircraft.
+    """
+    period, acceleration = limits.period, limits.max_braking
+    v = desired[4:7].copy()
+    error = desired[:3] - period * v - setpoint[:3]
+    distance = math.sqrt(np.sum(error * error))
+    if distance > 1e-9:
+        v += error * (braking_speed(distance, 0.8 * acceleration, period) / distance)
+    level = math.hypot(v[0], v[1])
+    if level > limits.max_speed:
+        v[0] *= limits.max_speed / level
+        v[1] *= limits.max_speed / level
+    v[2] = min(max(v[2], -limits.max_descent_speed), limits.max_climb_speed)
+    change = v - setpoint[4:7]
+    size = math.sqrt(np.sum(change * change))
+    if size > acceleration * period:
+        v = setpoint[4:7] + change * (acceleration * period / size)
+    for axis in range(3):
+        down = braking_speed(setpoint[axis] - fence[0, axis], 0.5 * acceleration, period)
+        up = braking_speed(fence[1, axis] - setpoint[axis], 0.5 * acceleration, period)
+        v[axis] = min(max(v[axis], -down), up)
+    return v
+
+
+@kernel
+def next_yaw(yaw: float, desired: float, limits: FlightLimits) -> float:
+    """Returns the yaw after the desired one, at most so much farther as the rate allows."""
+    error = math.atan2(math.sin(desired - yaw), math.cos(desired - yaw))
+    return yaw + approach(0.0, error, limits.max_yaw_rate * limits.period)
+
+
+def warm_up() -> None:
+    """Compiles the kernels, or loads them from numba's cache."""
+    three, seven = np.zeros(3), np.zeros(7)
+    window = np.zeros((1, 1, 1), np.int8)
+    free_flight(window, np.zeros(3, np.int64), 1.0, three, np.ones(3), 1.0, 0.3)
+    braked(three, 1.0, 0.1)
+    wished(seven, seven, np.zeros((2, 3)), FlightLimits())
+    next_yaw(0.0, 0.0, FlightLimits())
