@@ -7,10 +7,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from unilavira_drake.resources import package_xml
+from unilavira_drake.robots.actuation import add_actuation
 from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.robots.quadrotor_actuation import (
     add_landing_ground,
-    add_quadrotor_actuation,
     set_flight_start,
 )
 from unilavira_drake.robots.wind import STILL_AIR
@@ -28,9 +28,7 @@ def add_flying_body(builder, robot, wind, start=(0.0, 0.0, 0.0)):
     add_landing_ground(plant)
     plant.Finalize()
     set_flight_start(plant, model, robot, start)
-    X_WB, twist = add_quadrotor_actuation(builder, plant, model, robot, wind=wind)
-    for port, name in ((X_WB, "pose_estimate"), (twist, "twist"), (X_WB, "cheat_X_WB")):
-        builder.ExportOutput(port, name)
+    add_actuation(builder, plant, model, robot, wind=wind)
 
 
 class Flight:

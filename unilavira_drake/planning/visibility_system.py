@@ -285,7 +285,9 @@ class VisibilityPlanner(Level):
             return _done(state, n, "failed", "the pose is lost", None) if late else state
         x, y, z = (float(value) for value in state.path.p_WP[-1])
         if math.dist(position, (x, y, z)) <= self._tolerance:
-            heading = _arrival(state.path) if state.heading is None else state.heading
+            # Nobody came from anywhere by a climb at the start.
+            came = _arrival(state.path) if n > 0 else None
+            heading = came if state.heading is None else state.heading
             return _arrived(state, position, heading)
         step = math.dist(position, state.position)
         if step >= PROGRESS:

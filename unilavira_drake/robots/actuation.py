@@ -53,20 +53,25 @@ def add_actuation(
         X_WB, twist = add_ground_actuation(
             builder, plant, model_instance, robot, locomotion, ground_height
         )
+        believing = None
     elif isinstance(robot, Quadrotor):
-        X_WB, twist = add_quadrotor_actuation(builder, plant, model_instance, robot, wind=wind)
+        X_WB, twist, believing = add_quadrotor_actuation(
+            builder, plant, model_instance, robot, wind=wind
+        )
     else:
         raise TypeError(_unknown(robot))
     builder.ExportOutput(X_WB, "cheat_X_WB")
     builder.ExportOutput(twist, "twist")
-    if localization is None or localization.exact:
-        builder.ExportOutput(X_WB, "pose_estimate")
-        return
-    estimator = builder.AddSystem(PoseEstimator(config=localization, seed=seed))
-    builder.Connect(X_WB, estimator.GetInputPort("X_WB"))
-    builder.Connect(twist, estimator.GetInputPort("twist"))
-    builder.ExportInput(estimator.GetInputPort("recalibrations"), "recalibrations")
-    builder.ExportOutput(estimator.GetOutputPort("pose_estimate"), "pose_estimate")
+    estimate = X_WB
+    if localization is not None and not localization.exact:
+        estimator = builder.AddSystem(PoseEstimator(config=localization, seed=seed))
+        builder.Connect(X_WB, estimator.GetInputPort("X_WB"))
+        builder.Connect(twist, estimator.GetInputPort("twist"))
+        builder.ExportInput(estimator.GetInputPort("recalibrations"), "recalibrations")
+        estimate = estimator.GetOutputPort("pose_estimate")
+    if believing is not None:
+        builder.Connect(estimate, believing)
+    builder.ExportOutput(estimate, "pose_estimate")
 
 
 def set_start(

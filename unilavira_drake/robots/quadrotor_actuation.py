@@ -15,7 +15,7 @@ from pydrake.multibody.plant import (
     PropellerInfo,
 )
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import LinearSystem, MatrixGain
 
 from unilavira_drake.robots.flight_autopilot import FlightAutopilot
@@ -36,11 +36,11 @@ def add_quadrotor_actuation(
     robot: Quadrotor,
     *,
     wind: WindModel = STILL_AIR,
-) -> tuple[OutputPort, OutputPort]:
-    """Adds the autopilot, rotors with lag, propellers, drag and wind; see ``add_actuation``.
+) -> tuple[OutputPort, OutputPort, InputPort]:
+    """Adds the autopilot, rotors with lag, propellers, drag and wind.
 
-    Exports ``base_command`` [x, y, z, yaw, vx, vy, vz], and takes the plant's ports for applied
-    forces.  The autopilot flies by the true pose.
+    Exports the input ``base_command`` [x, y, z, yaw, vx, vy, vz].  It takes the plant's ports for
+    applied forces.
 
     Args:
         builder: of the station.
@@ -50,7 +50,7 @@ def add_quadrotor_actuation(
         wind: the air around it.
 
     Returns:
-        The ports of the true pose X_WB and of the twist.
+        The ports of the true pose X_WB and of the twist, and the autopilot's for its pose estimate.
     """
     base = builder.AddSystem(FloatingBase())
     state = plant.get_state_output_port(model_instance)
@@ -63,12 +63,12 @@ def add_quadrotor_actuation(
             period=robot.autopilot_period,
         ),
     )
-    builder.Connect(base.GetOutputPort("pose"), autopilot.GetInputPort("pose_estimate"))
     builder.Connect(base.GetOutputPort("twist"), autopilot.GetInputPort("twist"))
     _add_rotors(builder, plant, model_instance, robot, autopilot)
     _add_air(builder, plant, model_instance, robot, wind)
     builder.ExportInput(autopilot.GetInputPort("base_command"), "base_command")
-    return base.GetOutputPort("pose"), base.GetOutputPort("twist")
+    estimate = autopilot.GetInputPort("pose_estimate")
+    return base.GetOutputPort("pose"), base.GetOutputPort("twist"), estimate
 
 
 def airframe_of(
