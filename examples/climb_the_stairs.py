@@ -34,7 +34,7 @@ if __name__ == "__main__":
     log, house = Log(), load_world("two_storey")
     result = run_episode(scenario, on_event=log)
     places = np.array(log.places)
-    figure, axes = plt.subplots(1, 3, figsize=(15, 4.4), layout="tight")
+    figure, axes = plt.subplots(1, 3, figsize=(15, 4.4), layout="tight", subplot_kw={"fc": "0.9"})
     for one, (floor, seen) in zip(axes, sorted(log.maps.items()), strict=False):
         draw_occupancy(one, seen)
         here = places[np.abs(places[:, 3] - floor) < 0.5]
