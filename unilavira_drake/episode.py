@@ -80,7 +80,12 @@ def run_episode(
     """
     task = choose_task(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
-    start = parse_start_pose(task.start, world, radius=scenario.robot.turning_radius)
+    start = parse_start_pose(
+        task.start,
+        world,
+        radius=scenario.robot.turning_radius,
+        climbs=scenario.robot.can_climb,
+    )
     goal = None
     if task.goal:
         goal = make_goal(task.goal, world, task.rule, radius=scenario.robot.radius)

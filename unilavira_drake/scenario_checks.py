@@ -36,7 +36,7 @@ from unilavira_drake.sensors.exposure_config import EXPOSURES
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.tasks import FAMILIES, checked_task, success_rule
 from unilavira_drake.worlds.load import load_world
-from unilavira_drake.worlds.start import parse_start
+from unilavira_drake.worlds.start import parse_start_pose
 from unilavira_drake.worlds.world import World
 
 _MAX_IMAGE = 4096
@@ -128,7 +128,12 @@ def validate(scenario: Scenario) -> None:
     _check_periods(scenario)
     _check_tasks(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
-    start = parse_start(choose_task(scenario).start, world, radius=scenario.robot.turning_radius)
+    start = parse_start_pose(
+        choose_task(scenario).start,
+        world,
+        radius=scenario.robot.turning_radius,
+        climbs=scenario.robot.can_climb,
+    )
     _check_people(scenario, world, start[:2])
 
 

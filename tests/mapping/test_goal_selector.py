@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 from pydrake.common.value import AbstractValue
+from rendered_stairs import frames
 
 from unilavira_drake.errors import PortTypeError
 from unilavira_drake.mapping.goal_selector import NO_STAIRS, GoalSelector
@@ -17,6 +18,7 @@ from unilavira_drake.messages import (
     VisionAction,
     Waypoint,
 )
+from unilavira_drake.worlds.load import load_world
 
 LENS = Intrinsics(64, 48, 40.0, 40.0, 31.5, 23.5)
 
@@ -61,7 +63,7 @@ def turn(direction="front"):
         (LanguageAction(n=4, tool="stop"), Goal(0)),
         (LanguageAction(n=4, tool="stay"), Goal(4, "stay")),
         (LanguageAction(n=4, tool="double_check"), Goal(4, "stay")),
-        (LanguageAction(n=4, tool="go_stair", stair="up"), Goal(4, "none", reason=NO_STAIRS)),
+        (LanguageAction(n=4, tool="go_stair", stair="up"), Goal(0)),
         (LanguageAction(n=4, tool="none", reason="bad"), Goal(4, "none", reason="bad")),
         (LanguageAction(n=4, tool="none"), Goal(4, "none", reason="no usable action")),
         (
@@ -162,3 +164,35 @@ def test_another_message_type_is_named():
         selector.GetInputPort(name).FixValue(context, AbstractValue.Make(History()))
     with pytest.raises(PortTypeError, match=r"language_action.*LanguageAction.*History"):
         selector.GetOutputPort("goal").Eval(context)
+
+
+def test_stairs_that_are_not_seen_are_told() -> None:
+    action = LanguageAction(n=4, tool="go_stair", stair="down")
+    for vision, words in (
+        (VisionAction(n=4, direction="front", reason="only a wall"), "only a wall"),
+        (VisionAction(n=4, direction="front", point=(30.0, 20.0)), "no steps that fall away"),
+        (VisionAction(n=4, direction="right", point=(30.0, 20.0)), "there is no view 'right'"),
+    ):
+        goal = goal_of(action, vision)
+        assert goal.kind == "none"
+        assert goal.reason.startswith(NO_STAIRS)
+        assert words in goal.reason
+
+
+def test_stairs_begin_where_the_steps_do() -> None:
+    stairs = load_world("two_storey").stairs[0]
+    (view,) = frames(load_world("two_storey"), [(6.6, 0.8, 0.0, math.pi / 2)], 1.0)
+    seen = Panorama(n=4, first=4, frames=(view,))
+    action = LanguageAction(n=4, tool="go_stair", stair="up")
+    goal = goal_of(
+        action, VisionAction(n=4, direction="front", point=(240.0, 140.0)), panorama=seen
+    )
+    assert goal.kind == "climb"
+    assert math.dist(goal.p_WG, (*stairs.foot, 0.0)) < 0.1
+    assert goal.heading == pytest.approx(stairs.heading, abs=0.03)
+
+
+def test_nobody_backtracks_over_stairs() -> None:
+    above = History(n=4, current=2, waypoints=(Waypoint(id=1, position=(5, 6, 2.8)),))
+    goal = goal_of(LanguageAction(n=4, tool="backtrack", waypoint=1), history=above)
+    assert (goal.kind, "another floor" in goal.reason) == ("none", True)

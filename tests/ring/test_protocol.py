@@ -86,6 +86,7 @@ def test_one_episode_through_every_row() -> None:
         (4, 0),
         (5, 0),
         (7, 0),
+        (8, 0),
     ]
 
 
@@ -107,7 +108,7 @@ def shown() -> ScriptedModel:
         (6, "failed: stuck"),
         (7, "arrived"),
         (8, "arrived"),
-        (9, "failed: stairs"),
+        (9, "failed: no stairs"),
         (10, "failed: unreachable"),
         (11, "arrived"),
         (12, "arrived"),

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from unilavira_drake import load_scenario
 from unilavira_drake.errors import ScenarioError, TaskError
 from unilavira_drake.worlds.clearance import clearance, nearest_obstacle
 from unilavira_drake.worlds.load import load_world
@@ -113,6 +114,15 @@ def test_starts_on_an_upper_storey() -> None:
     ):
         with pytest.raises(TaskError, match=words):
             parse_start_pose(text, HOUSE, radius=0.4)
+
+
+def test_who_cannot_climb_cannot_start_upstairs() -> None:
+    for text in ("bathroom", "7.0,8.4,2.8,1.57"):
+        with pytest.raises(TaskError, match="cannot climb"):
+            parse_start_pose(text, HOUSE, radius=0.4, climbs=False)
+    assert parse_start_pose("kitchen", HOUSE, radius=0.4, climbs=False)[2] == 0.0
+    with pytest.raises(TaskError, match=r"set robot\.can_climb"):
+        load_scenario("two_storey", "robot: !UnitreeGo1 {can_climb: false}\ntask: {text: '@sofa'}")
 
 
 def test_a_storey_alone_is_a_world_of_one() -> None:

@@ -27,7 +27,7 @@ def parse_start(text: str, world: World, *, radius: float) -> tuple[float, float
 
 
 def parse_start_pose(
-    text: str, world: World, *, radius: float
+    text: str, world: World, *, radius: float, climbs: bool = True
 ) -> tuple[float, float, float, float]:
     """Returns x, y, height of the floor (metres) and yaw (radians) of a start.
 
@@ -40,12 +40,22 @@ def parse_start_pose(
         text: ROOM, X,Y,YAW or X,Y,Z,YAW.
         world: where the start must be free.
         radius: the robot's, metres; a start keeps at least this clearance.
+        climbs: whether the robot can stand on another floor than the one at height 0.
 
     Raises:
-        TaskError: names the value and the remedy, for malformed text, an unknown room, and a
-            place outside the world, in a wall or in furniture.
+        TaskError: names the value and the remedy, for malformed text, an unknown room, a place
+            outside the world, in a wall or in furniture, and a floor where it cannot stand.
     """
-    text = text.strip()
+    x, y, floor, yaw = _parsed(text.strip(), world, radius)
+    if floor != 0.0 and not climbs:
+        raise TaskError(
+            f"start: {text!r} is on another floor, and this robot cannot climb; choose a room on "
+            "the ground floor, or set robot.can_climb: true."
+        )
+    return x, y, floor, yaw
+
+
+def _parsed(text: str, world: World, radius: float) -> tuple[float, float, float, float]:
     if not text:
         raise TaskError(f"start: empty; give a room ({_rooms(world)}) or X,Y,YAW.")
     if "," not in text:
