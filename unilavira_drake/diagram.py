@@ -18,7 +18,7 @@ from unilavira_drake.model_pair import ModelPair, make_models
 from unilavira_drake.navigation import make_navigation
 from unilavira_drake.people.adding import mapping_among, oldest_panorama, planning_among
 from unilavira_drake.people.config import tells_of_people
-from unilavira_drake.people.crowd import make_crowd, with_people
+from unilavira_drake.people.crowd import detected_labels, make_crowd, with_people
 from unilavira_drake.people.tracker import PeopleTracker
 from unilavira_drake.recording.recorder import Recorder
 from unilavira_drake.scenario import Scenario
@@ -132,6 +132,7 @@ def make_navigation_diagram(
             tick=scenario.tick,
             time_step=scenario.plant.time_step,
             replace=own,
+            moving_labels=detected_labels(world, scenario.people),
         ),
     )
     wiring.add(
@@ -143,6 +144,8 @@ def make_navigation_diagram(
     _close_the_ring(wiring, scenario.robot.views)
     if scenario.people.count:
         wiring.connect("station", "cheat_people", "episode_monitor")
+    if detected_labels(world, scenario.people):
+        wiring.connect("station", "front.label_image", "navigation")
     if tells_of_people(scenario.people):
         _track_people(wiring, scenario, world, (x, y))
     if on_message is not None:

@@ -9,7 +9,7 @@ from unilavira_drake.evaluation.scoring import Score
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.model_pair import ModelPair
-from unilavira_drake.people.config import tells_of_people
+from unilavira_drake.people.config import reads_labels
 from unilavira_drake.recording.result import (
     EpisodeResult,
     JudgeResult,
@@ -95,7 +95,7 @@ def _model(models: ModelPair, scenario: Scenario) -> ModelResult:
     language, vision = models.language.backend, models.vision.backend
     # The weaker claim stands for the pair: one level on ground truth taints the whole result.
     perceptions = {language.perception, vision.perception}
-    if scenario.grounder == "label" or tells_of_people(scenario.people):
+    if scenario.grounder == "label" or reads_labels(scenario.people):
         perceptions.add("ground_truth")
     return ModelResult(
         language=language.name,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import MutableMapping
+from collections.abc import MutableMapping, Sequence
 
 from pydrake.systems.framework import Diagram, System
 
@@ -30,15 +30,18 @@ def make_navigation(
     tick: float,
     time_step: float,
     replace: MutableMapping[str, System] | None = None,
+    moving_labels: Sequence[int] = (),
 ) -> Diagram:
     """Returns the deterministic half of Robot Action (paper III-B.3); the robot's type chooses.
+
+    With ``moving_labels``, render labels of what moves, it has the input ``front.label_image``.
 
     Raises:
         TypeError: if nothing is known to steer such a robot.
     """
     if isinstance(robot, GroundRobot):
         return _make_ground_navigation(
-            robot, intrinsics, mapping, planning, tick, time_step, replace
+            robot, intrinsics, mapping, planning, tick, time_step, replace, moving_labels
         )
     raise TypeError(f"nothing steers a {type(robot).__name__}; derive it from GroundRobot")
 
@@ -51,9 +54,10 @@ def _make_ground_navigation(
     tick: float,
     time_step: float,
     replace: MutableMapping[str, System] | None,
+    moving_labels: Sequence[int],
 ) -> Diagram:
     wiring = Wiring(replace)
-    _add_mapper_and_planner(wiring, robot, intrinsics, mapping, planning, tick)
+    _add_mapper_and_planner(wiring, robot, intrinsics, mapping, planning, tick, moving_labels)
     limits = DriveLimits(
         max_speed=robot.max_speed,
         max_yaw_rate=robot.max_yaw_rate,
@@ -96,6 +100,8 @@ def _make_ground_navigation(
     wiring.take_input("sweep", "controller")
     wiring.take_input("front.depth_image", "mapper")
     wiring.take_input("front.X_BC", "mapper")
+    if moving_labels:
+        wiring.take_input("front.label_image", "mapper")
     wiring.take_input("pose_estimate", "mapper", "planner", "controller", "governor")
     wiring.take_input("twist", "controller", "governor")
     for role in ("language", "vision"):
@@ -114,6 +120,7 @@ def _add_mapper_and_planner(
     mapping: MappingConfig,
     planning: PlanningConfig,
     tick: float,
+    moving_labels: Sequence[int],
 ) -> None:
     wiring.add(
         "mapper",
@@ -129,6 +136,7 @@ def _add_mapper_and_planner(
             turn=math.radians(mapping.turn_degrees),
             rest_period=mapping.rest_period,
             moving=mapping.moving,
+            moving_labels=moving_labels,
             period=tick,
         ),
     )

@@ -15,8 +15,10 @@ from unilavira_drake import load_scenario
 from unilavira_drake.messages import Goal, Panorama, Sweep
 from unilavira_drake.navigation import make_navigation
 from unilavira_drake.people.adding import mapping_among, planning_among
+from unilavira_drake.people.crowd import detected_labels, with_people
 from unilavira_drake.sensors.rig import front_intrinsics
 from unilavira_drake.station import make_navigation_station
+from unilavira_drake.worlds.load import load_world
 
 
 @dataclass
@@ -38,6 +40,8 @@ class Drive:
     def __init__(self, start, goal, people, name="apartment", **overlay):
         overlay = {"people": people, **overlay}
         scenario = load_scenario(name, json.dumps(overlay))
+        world = with_people(load_world(scenario.world.name), scenario.people)
+        labels = detected_labels(world, scenario.people)
         builder = DiagramBuilder()
         self.station = builder.AddSystem(make_navigation_station(scenario, start=start))
         self.navigation = builder.AddSystem(
@@ -48,9 +52,11 @@ class Drive:
                 planning=planning_among(scenario.people, scenario.planning),
                 tick=scenario.tick,
                 time_step=scenario.plant.time_step,
+                moving_labels=labels,
             )
         )
-        for port in ("front.depth_image", "front.X_BC", "pose_estimate", "twist"):
+        ports = ("front.label_image",) if labels else ()
+        for port in (*ports, "front.depth_image", "front.X_BC", "pose_estimate", "twist"):
             builder.Connect(self.station.GetOutputPort(port), self.navigation.GetInputPort(port))
         builder.Connect(
             self.navigation.GetOutputPort("base_command"),

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
 import pytest
-from drive import Drive
 from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -15,8 +15,11 @@ from unilavira_drake import load_scenario
 from unilavira_drake.language.people_notes import FORGOTTEN, people_in_view
 from unilavira_drake.messages import Panorama
 from unilavira_drake.messages.people import PeopleTracks, PersonTrack
+from unilavira_drake.people.crowd import with_people
 from unilavira_drake.people.tracker import PeopleTracker, follow
 from unilavira_drake.sensors.rig import front_intrinsics
+from unilavira_drake.station import make_navigation_station
+from unilavira_drake.worlds.load import load_world
 
 HERE = Panorama(n=1, X_WB=np.eye(4))
 
@@ -69,35 +72,27 @@ def test_a_velocity_needs_two_looks_close_in_time():
 
 
 def test_the_tracker_finds_who_walks_in_view():
-    people = {
-        "count": 1,
-        "routes": [{"waypoints": ["6.0,5.2", "10.0,6.0"], "speed": 0.9, "color": "red"}],
-    }
-    drive = Drive((3.0, 5.7, 0.0), (3.0, 5.7), people)
-    robot = load_scenario("apartment").robot
+    route = {"waypoints": ["6.0,5.2", "10.0,6.0"], "speed": 0.9, "color": "red"}
+    scenario = load_scenario("apartment", json.dumps({"people": {"count": 1, "routes": [route]}}))
+    world = with_people(load_world("apartment"), scenario.people)
     builder = DiagramBuilder()
-    builder.AddSystem(drive.station)
-    labels = [entry for entry in (200, 109, 108, 107) if entry]
+    station = builder.AddSystem(make_navigation_station(scenario, start=(3.0, 5.7, 0.0)))
     tracker = builder.AddSystem(
         PeopleTracker(
-            clothes={label: "red" for label in labels}, intrinsics=front_intrinsics(robot)
+            clothes={world.label_of("person_1"): "red"},
+            intrinsics=front_intrinsics(scenario.robot),
         )
     )
     for port in ("front.depth_image", "front.label_image", "front.X_BC", "pose_estimate"):
-        builder.Connect(drive.station.GetOutputPort(port), tracker.GetInputPort(port))
-    diagram = builder.Build()
-    simulator = Simulator(diagram)
+        builder.Connect(station.GetOutputPort(port), tracker.GetInputPort(port))
+    simulator = Simulator(builder.Build())
     context = simulator.get_mutable_context()
-    drive.station.GetInputPort("base_command").FixValue(
-        drive.station.GetMyMutableContextFromRoot(context), np.zeros(3)
-    )
+    inside = station.GetMyMutableContextFromRoot(context)
+    station.GetInputPort("base_command").FixValue(inside, np.zeros(3))
     simulator.AdvanceTo(3.0)
-    truth = drive.station.GetOutputPort("cheat_people").Eval(
-        drive.station.GetMyContextFromRoot(context)
-    )
+    (person,) = station.GetOutputPort("cheat_people").Eval(inside).people
     tracks = tracker.GetOutputPort("people").Eval(tracker.GetMyContextFromRoot(context))
     (track,) = tracks.tracks
-    (person,) = truth.people
     # The look is up to half a second old.
     assert math.dist(track.position, person.position) < 0.6
     assert math.hypot(*track.velocity) == pytest.approx(0.9, abs=0.15)

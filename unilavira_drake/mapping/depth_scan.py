@@ -196,8 +196,8 @@ def carve(
     ``touched`` tells which of them changed.  A cell seen free loses ``free_step``.  Nearer than the
     first floor in view the camera looks over low things: there, free only replaces unknown.
 
-    With ``newest`` above 0, what appears where the floor was free is believed at once, with just
-    these log-odds: it may go again, and is forgotten where the camera looks over it, too.
+    With ``newest`` above 0, what appears where the floor was free is believed at once, with
+    log-odds 1 less: it may go again, and is forgotten where the camera looks over it, too.
     """
     forward_x, forward_y, resolution = grid[0], grid[1], grid[2]
     per_bearing, first = camera[0] / stride, (camera[2] + 0.5) / stride
@@ -251,7 +251,7 @@ def _strike(
         row, column = corner[0] + place // columns, corner[1] + place % columns
         old: Any = np.int64(log_odds[row, column])
         if newest > 0 and old != 0 and old <= newest:
-            log_odds[row, column] = newest
+            log_odds[row, column] = max(newest - 1, 1)
             touched[row // TILE, column // TILE] = True
         elif old != LIMIT:
             new = min(old + HIT_STEP, LIMIT)

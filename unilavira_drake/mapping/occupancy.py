@@ -70,8 +70,9 @@ class MappingParameters(Message):
     gone after 3 looks at the place for one look before, 10 at most; from 40 on after one."""
     newest: int = 0
     """For things that move: what appears on free floor is believed after one look, forgotten after
-    one, and out of view after so many seconds (at most ``free_step``).  0: nothing is expected to
-    move, and what comes is believed after five looks."""
+    one, and out of view after so many seconds less one (at most ``free_step``).  What is known to
+    move has just these log-odds.  0: nothing is expected to move, and what comes is believed after
+    five looks."""
     saturation: float = math.inf
     """Readings from here on are none: what the sensor says when it knows nothing.  Without it a
     reading of inf says that nothing lies within the range, as it does for Drake's cameras."""

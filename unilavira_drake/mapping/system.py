@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import Context
-from pydrake.systems.sensors import ImageDepth32F
+from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I
 
 from unilavira_drake.mapping.depth_scan import FREE_STEP, warm_up
 from unilavira_drake.mapping.depth_view import DepthView
+from unilavira_drake.mapping.moving_things import wanted, with_moving, without
 from unilavira_drake.mapping.occupancy import NEWEST, MappingParameters, integrate
 from unilavira_drake.mapping.stair_corridor import StairCorridor, corridor_at
 from unilavira_drake.mapping.storeys import Storey, Storeys
@@ -74,6 +76,7 @@ class OccupancyMapper(Level):
         - front.X_BC
         - pose_estimate
         - goal (optional)
+        - front.label_image (where labels that move are given)
         output_ports:
         - map
 
@@ -90,6 +93,8 @@ class OccupancyMapper(Level):
         saturation: readings from here on are none, metres.
         rest_period: seconds between two integrations at rest.
         moving: whether things move about, see ``MappingParameters.newest``.
+        moving_labels: render labels of things that are known to move, as a detector of people would
+            tell; with ``moving``.
         base_height: height of the base frame's origin above the floor, metres.
         period: seconds between two polls.
     """
@@ -109,6 +114,7 @@ class OccupancyMapper(Level):
         turn: float = math.radians(15.0),
         rest_period: float = 2.0,
         moving: bool = False,
+        moving_labels: Sequence[int] = (),
         base_height: float = 0.0,
         period: float = 0.1,
     ) -> None:
@@ -137,6 +143,10 @@ class OccupancyMapper(Level):
         self._X_BC = pose_input(self, "front.X_BC")
         self._pose = pose_input(self, "pose_estimate")
         self._goal = message_input(self, "goal", Goal())
+        self._moves = wanted(moving_labels)
+        self._label_image = (
+            image_input(self, "front.label_image", ImageLabel16I) if moving_labels else None
+        )
         self.declare_output("map", lambda state: state.occupancy, OccupancyMap())
         warm_up()
 
@@ -151,7 +161,8 @@ class OccupancyMapper(Level):
         X_WB = pose_matrix(self._pose(context))
         if panorama.first > state.occupancy.n:
             oldest = context.get_time() - self._oldest
-            views = tuple(DepthView.of(f) for f in panorama.frames if f.time >= oldest)
+            frames = [frame for frame in panorama.frames if frame.time >= oldest]
+            views = tuple((DepthView.of(frame), self._moves[frame.label]) for frame in frames)
             return self._integrated(context, state, X_WB, panorama.X_WB, views, panorama.n)
         if panorama.n > state.occupancy.n:
             occupancy = dc.replace(state.occupancy, n=panorama.n)
@@ -160,11 +171,12 @@ class OccupancyMapper(Level):
             return state
         image = self._depth_image(context)
         X_WC = pose_matrix(self._pose(context) @ self._X_BC(context))
-        views = (DepthView(pixels(image)[:, :, 0], self._intrinsics, X_WC),)
+        view = DepthView(pixels(image)[:, :, 0], self._intrinsics, X_WC)
         corridor = self._corridor(context, state, X_WB)
         if corridor is not None:
-            views = (corridor.seen(views[0]),)
+            view = corridor.seen(view)
             state = _freed(state, corridor)
+        views = ((view, self._seen_moving(context)),)
         return self._integrated(context, state, X_WB, X_WB, views, state.occupancy.n)
 
     def _corridor(
@@ -177,6 +189,12 @@ class OccupancyMapper(Level):
         width = self._parameters.footprint_radius
         place = (float(X_WB[0, 3]), float(X_WB[1, 3]), float(X_WB[2, 3]) - self._base_height)
         return corridor_at(goal, place, half_width=width)
+
+    def _seen_moving(self, context: Context) -> NDArray[np.bool_]:
+        if self._label_image is None:
+            return np.zeros((1, 1), np.bool_)
+        moves: NDArray[np.bool_] = self._moves[pixels(self._label_image(context))[:, :, 0]]
+        return moves
 
     def _due(self, time: float, state: MapperState, X_WB: NDArray[np.float64]) -> bool:
         if time - state.time >= self._rest_period - 1e-9:
@@ -193,7 +211,7 @@ class OccupancyMapper(Level):
         state: MapperState,
         X_WB: NDArray[np.float64],
         X_WB_seen: NDArray[np.float64],
-        views: tuple[DepthView, ...],
+        views: tuple[tuple[DepthView, NDArray[np.bool_]], ...],
         n: int,
     ) -> MapperState:
         """Returns the state after views that were taken when the base was at ``X_WB_seen``."""
@@ -203,7 +221,7 @@ class OccupancyMapper(Level):
         storeys = state.storeys.at(floor_height, position)
         occupancy = integrate(
             storeys.occupancy,
-            views,
+            tuple(without(view, moves) if moves.any() else view for view, moves in views),
             parameters=self._parameters,
             position=position,
             floor_height=floor_height,
@@ -215,6 +233,9 @@ class OccupancyMapper(Level):
             # Nothing could be believed; motion is measured from the last pose that was one.
             occupancy = dc.replace(state.occupancy, n=n, rejected=occupancy.rejected)
             return dc.replace(state, occupancy=occupancy, time=time)
+        moving = [(view, moves) for view, moves in views if moves.any()]
+        if moving:
+            occupancy = with_moving(occupancy, moving, self._parameters, floor_height)
         # The versions of all storeys are one count.
         occupancy = dc.replace(occupancy, version=state.occupancy.version + 1)
         return MapperState(occupancy, storeys.mapped(occupancy), position, _yaw(X_WB), time)

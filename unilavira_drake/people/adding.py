@@ -23,7 +23,7 @@ AMONG_PEOPLE = {"travel": 0.08, "rest_period": 0.3}
 
 
 WAIT = 15.0
-"""Seconds for which the planner waits where people stand in the only way."""
+"""Seconds for which the planner waits where people stand in the way."""
 
 
 STALE = 2.0
@@ -49,7 +49,11 @@ def planning_among(people: PeopleConfig, planning: PlanningConfig) -> PlanningCo
     """Returns the planner's numbers for a world with these people: it waits till they are gone."""
     if people.count == 0:
         return planning
-    return dataclasses.replace(planning, patience=max(planning.patience, WAIT))
+    return dataclasses.replace(
+        planning,
+        patience=max(planning.patience, WAIT),
+        stuck_time=max(planning.stuck_time, WAIT),
+    )
 
 
 def connect_people(

@@ -43,6 +43,9 @@ class PeopleConfig:
     stop_distance: float = 1.0
     # Who could not go on for so long turns back, seconds.
     patience: float = 4.0
+    # Whether the mapper knows which pixels are people, as a detector would tell it: from the
+    # simulator's labels, so the result then says perception ground_truth.  false: depth alone.
+    detected: bool = True
     # Whether the prompt says who is where and moves how: the simulator's labels tell it, so the
     # result then says perception ground_truth.
     in_prompt: bool = False
@@ -51,3 +54,8 @@ class PeopleConfig:
 def tells_of_people(config: PeopleConfig) -> bool:
     """Whether prompts say who is where and moves how."""
     return config.count > 0 and config.in_prompt
+
+
+def reads_labels(config: PeopleConfig) -> bool:
+    """Whether anything of the robot is told by labels who is a person."""
+    return config.count > 0 and (config.in_prompt or config.detected)

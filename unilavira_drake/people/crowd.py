@@ -61,6 +61,13 @@ def person_names(config: PeopleConfig) -> tuple[str, ...]:
     return tuple(f"person_{k}" for k in range(1, config.count + 1))
 
 
+def detected_labels(world: World, config: PeopleConfig) -> tuple[int, ...]:
+    """Returns the labels of people that the mapper is told of."""
+    names = person_names(config) if config.detected else ()
+    labels = (world.label_of(name) for name in names)
+    return tuple(label for label in labels if label is not None)
+
+
 def with_people(world: World, config: PeopleConfig) -> World:
     """Returns the world with the labels of its people; the same world where there are none
     or it has them.

@@ -64,8 +64,8 @@ class Governor(LeafSystem):
         reaction_time: for which the base goes on at its measured speed before it obeys, seconds.
         command_timeout: seconds.
         map_timeout: seconds; longer than a mapper's period at rest.
-        newest: cells of at most so much log-odds are things that move, see ``MappingParameters``.
-        courtesy: what stays free before and beside the base to things that move, metres.
+        newest: cells of just these log-odds are people, see ``MappingParameters``; 0: none are.
+        courtesy: what stays free before and beside the base to them, metres.
         reply_timeout: seconds.
         pose_timeout: for which a moving base's pose may stay the same, seconds.
         max_lateral_speed: m/s; 0 for a differential base.
@@ -236,6 +236,6 @@ class Governor(LeafSystem):
 
         free = met(log_odds, self._footprint)
         if self._newest:
-            moving = np.where(log_odds <= self._newest, log_odds, 0).astype(np.int8)
+            moving = np.where(log_odds == self._newest, log_odds, 0).astype(np.int8)
             free = min(free, met(read_only(moving), self._shy))
         return free
