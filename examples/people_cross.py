@@ -11,31 +11,32 @@ from unilavira_drake import load_scenario
 from unilavira_drake.messages import Goal, Panorama, Sweep
 from unilavira_drake.navigation import make_navigation
 from unilavira_drake.people.adding import mapping_among, planning_among
+from unilavira_drake.people.crowd import detected_labels, with_people
 from unilavira_drake.sensors.rig import front_intrinsics
 from unilavira_drake.station import make_navigation_station
+from unilavira_drake.worlds.load import load_world
 
-PEOPLE = """
-people:
-  count: 2
-  routes:
-  - {waypoints: ["7.6,4.2", "9.2,7.6"], speed: 0.5, delay: 3.0, color: red}
-  - {waypoints: [bathroom, living_room], speed: 0.9, color: blue}
-"""
+ROUTE = '{waypoints: ["7.6,4.2", "7.6,6.0"], speed: 0.5, pause: 3.0, delay: 2.5}'
+PEOPLE = f"people: {{count: 1, polite: false, routes: [{ROUTE}]}}"
 
 if __name__ == "__main__":
     scenario, builder = load_scenario("apartment", PEOPLE), DiagramBuilder()
+    people = scenario.people
+    world = with_people(load_world("apartment"), people)
     station = builder.AddSystem(make_navigation_station(scenario, start=(3.0, 5.7, 0.0)))
     navigation = builder.AddSystem(
         make_navigation(
             robot=scenario.robot,
             intrinsics=front_intrinsics(scenario.robot),
-            mapping=mapping_among(scenario.people, scenario.mapping),
-            planning=planning_among(scenario.people, scenario.planning),
+            mapping=mapping_among(people, scenario.mapping),
+            planning=planning_among(people, scenario.planning),
             tick=scenario.tick,
             time_step=scenario.plant.time_step,
+            moving_labels=detected_labels(world, people),
         )
     )
-    for port in ("front.depth_image", "front.X_BC", "pose_estimate", "twist"):
+    images = ("front.depth_image", "front.label_image")
+    for port in (*images, "front.X_BC", "pose_estimate", "twist"):
         builder.Connect(station.GetOutputPort(port), navigation.GetInputPort(port))
     builder.Connect(navigation.get_output_port(0), station.GetInputPort("base_command"))
     goal = Goal(n=1, kind="go", p_WG=(11.0, 5.7, 0.0))
@@ -45,14 +46,13 @@ if __name__ == "__main__":
     simulator = Simulator(builder.Build())
     there = station.GetMyContextFromRoot(simulator.get_context())
     rows = []
-    for time in np.arange(0.1, 20.0, 0.1):
+    for time in np.arange(0.1, 22.0, 0.1):
         simulator.AdvanceTo(time)
-        people = station.GetOutputPort("cheat_people").Eval(there)
-        speed = station.GetOutputPort("twist").Eval(there)[3]
-        rows.append((time, speed, people.gap, people.touched))
+        people, twist = (station.GetOutputPort(p).Eval(there) for p in ("cheat_people", "twist"))
+        rows.append((time, twist[3], people.gap, people.touched))
     time, speed, gap, touched = np.transpose(rows)
     figure, axes = plt.subplots(2, sharex=True, layout="constrained")
-    axes[0].plot(time, speed), axes[0].set_ylabel("speed of the robot, m/s")
-    axes[1].plot(time, gap), axes[1].set(xlabel="s", ylabel="to the nearest person, m")
+    axes[0].plot(time, speed), axes[0].set(ylabel="speed, m/s")
+    axes[1].plot(time, gap), axes[1].set(xlabel="s", ylabel="to the person, m")
     figure.savefig("people_cross.png")
     print(f"nearest {gap.min():.2f} m, touched: {bool(touched.any())}")

@@ -10,7 +10,7 @@ from drive import Drive
 from pydrake.systems.analysis import Simulator
 
 ALONG = {"start": (3.0, 5.7, 0.0), "goal": (11.0, 5.7)}
-SLOWLY = {"waypoints": ["7.6,4.2", "9.2,7.6"], "speed": 0.5, "pause": 30.0, "delay": 3.0}
+SLOWLY = {"waypoints": ["7.6,4.2", "7.6,6.0"], "speed": 0.5, "pause": 3.0, "delay": 2.5}
 CROSSING = {"waypoints": ["7.6,4.2", "6.5,7.6"], "speed": 1.0, "pause": 3.0, "delay": 2.0}
 
 
