@@ -36,6 +36,10 @@ RENDERER = "vtk"
 """Name of the render engine in the scene graph."""
 
 
+_HOUSE, _TOWN = 40.0, 600.0
+"""Metres; what depth cameras for rooms and for the open sky see at least in colour."""
+
+
 class CameraModel(Protocol):
     """A robot's cameras, all alike: image size in pixels and field of view in degrees."""
 
@@ -155,6 +159,11 @@ def _core(intrinsics: Intrinsics, min_depth: float, max_depth: float) -> RenderC
             intrinsics.cx + 0.5,
             intrinsics.cy + 0.5,
         ),
-        ClippingRange(min(0.05, min_depth), max(40.0, 2.0 * max_depth)),
+        ClippingRange(min(0.05, min_depth), _farthest(max_depth)),
         RigidTransform(),
     )
+
+
+def _farthest(max_depth: float) -> float:
+    """Returns how far colours reach, metres: through a house, or over a town to the horizon."""
+    return max(_HOUSE, 2.0 * max_depth) if max_depth <= _HOUSE / 2 else max(_TOWN, 2.0 * max_depth)
