@@ -86,7 +86,7 @@ ENTRIES = {
         seconds=2.3,
         start=(2.5, 8.75, -0.95),
         eye=(4.6, 6.85, 1.3),
-        target=(2.75, 8.2, 0.60),
+        target=(2.55, 8.0, 0.60),
         fov_degrees=66.0,
     ),
 }

@@ -112,13 +112,11 @@ def _set_the_scene(meshcat: Meshcat, way: NDArray[np.float64]) -> None:
     meshcat.SetProperty("/Lights/FillLight/<object>", "intensity", 2.2)
     meshcat.SetProperty("/Lights/FillLight/<object>", "position", [-5.0, -12.0, 9.0])
     meshcat.SetCameraPose((6.5, -1.0, 9.4), (6.5, 4.5, 0.0))
-    vertices, faces = _ribbon(way, 0.05)
+    vertices, faces = ribbon(way, 0.05)
     meshcat.SetTriangleMesh("/way", vertices, faces, Rgba(0.9, 0.35, 0.1, 1.0))
 
 
-def _ribbon(
-    way: NDArray[np.float64], width: float
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def ribbon(way: NDArray[np.float64], width: float) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Returns a band along a way as a mesh: vertices (3, 2k), faces (3, 2k - 2)."""
     moved = np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 0.01]
     points = way[moved] + (0.0, 0.0, 0.02)
