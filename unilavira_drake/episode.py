@@ -84,7 +84,7 @@ def run_episode(
         task.start,
         world,
         radius=scenario.robot.turning_radius,
-        climbs=scenario.robot.can_climb,
+        climbs=scenario.robot.leaves_the_ground,
     )
     goal = None
     if task.goal:

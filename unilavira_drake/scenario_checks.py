@@ -132,7 +132,7 @@ def validate(scenario: Scenario) -> None:
         choose_task(scenario).start,
         world,
         radius=scenario.robot.turning_radius,
-        climbs=scenario.robot.can_climb,
+        climbs=scenario.robot.leaves_the_ground,
     )
     _check_people(scenario, world, start[:2])
 

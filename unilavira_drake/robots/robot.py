@@ -46,6 +46,11 @@ class Robot:
     rest_speed: float = 0.03
     rest_rate: float = 0.03
 
+    @property
+    def leaves_the_ground(self) -> bool:
+        """Whether it can be on another floor than the one at height 0."""
+        return True
+
 
 @dc.dataclass
 class GroundRobot(Robot):
@@ -62,6 +67,11 @@ class GroundRobot(Robot):
     command_period: float = 0.0
     # How trunk and legs swing, by the joints that robots/gait.py names; null: wheels.
     gait: Gait | None = None
+
+    @property
+    def leaves_the_ground(self) -> bool:
+        """Whether it can be on another floor than the one at height 0."""
+        return self.can_climb
 
     @property
     def hold(self) -> float:
