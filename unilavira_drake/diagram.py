@@ -25,7 +25,7 @@ from unilavira_drake.recording.recorder import Recorder
 from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.scenario import Scenario, plant_config
 from unilavira_drake.sensors.detections import GroundTruthDetector
-from unilavira_drake.sensors.free_distance import free_distance, warm_up
+from unilavira_drake.sensors.free_distance import axial_distance, free_distance, warm_up
 from unilavira_drake.sensors.observer import Observer
 from unilavira_drake.sensors.rig import front_intrinsics
 from unilavira_drake.station import make_navigation_station
@@ -76,7 +76,6 @@ def make_navigation_diagram(
     task = choose_task(scenario)
     x, y, height, yaw = parse_start_pose(task.start, world, radius=scenario.robot.turning_radius)
     intrinsics = front_intrinsics(scenario.robot)
-    lowest, highest = _heights_in_the_way(scenario)
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))
     wiring.add(
@@ -112,12 +111,7 @@ def make_navigation_diagram(
             seed=scenario.random_seed,
             can_climb=scenario.robot.can_climb,
             max_range=scenario.robot.max_depth,
-            free_distance=functools.partial(
-                free_distance,
-                min_height=lowest,
-                max_height=highest,
-                max_range=scenario.robot.max_depth,
-            ),
+            free_distance=_free_distance(scenario),
             detector=functools.lru_cache(FRAMES_KEPT)(
                 detector or GroundTruthDetector(world.labels, max_range=scenario.robot.max_depth)
             ),
@@ -176,11 +170,17 @@ def make_navigation_diagram(
     return wiring.build("unilavira")
 
 
-def _heights_in_the_way(scenario: Scenario) -> tuple[float, float]:
-    """Returns between which heights, metres, something is in the robot's way."""
+def _free_distance(scenario: Scenario) -> Callable[[Frame], float]:
+    """Returns what measures how far a view is free: over a floor, or along an aircraft's axis."""
+    max_range = scenario.robot.max_depth
     if isinstance(scenario.robot, Quadrotor):
-        return scenario.flight.min_altitude, scenario.flight.max_altitude
-    return scenario.mapping.min_height, scenario.mapping.max_height
+        return functools.partial(axial_distance, max_range=max_range)
+    return functools.partial(
+        free_distance,
+        min_height=scenario.mapping.min_height,
+        max_height=scenario.mapping.max_height,
+        max_range=max_range,
+    )
 
 
 _PEOPLE_LEVELS = ("people_tracker",)

@@ -154,6 +154,6 @@ def _joined(leg: Leg, other: Leg) -> Leg:
     """Returns a leg with the other landmark beside it; a roof is that of its building."""
     if leg.landmark in ("roof", "chimney"):
         return dataclasses.replace(leg, landmark=other.landmark, color=leg.color or other.color)
-    if other.landmark == leg.landmark:
+    if other.landmark == leg.landmark or leg.kind == "along":
         return leg
     return dataclasses.replace(leg, beside=other.landmark)
