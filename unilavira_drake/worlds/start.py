@@ -47,10 +47,14 @@ def parse_start_pose(
             outside the world, in a wall or in furniture, and a floor where it cannot stand.
     """
     x, y, floor, yaw = _parsed(text.strip(), world, radius)
-    if floor != 0.0 and not climbs and not world.outdoors:  # There it is a place in the air.
+    if floor != 0.0 and not climbs:
+        remedy = (
+            "choose X,Y,YAW, or an aircraft (robot: !Quadrotor {})"
+            if world.outdoors
+            else "choose a room on the ground floor, or set robot.can_climb: true"
+        )
         raise TaskError(
-            f"start: {text!r} is on another floor, and this robot cannot climb; choose a room on "
-            "the ground floor, or set robot.can_climb: true."
+            f"start: {text!r} is above the ground floor, and this robot cannot climb; {remedy}."
         )
     return x, y, floor, yaw
 
