@@ -87,11 +87,11 @@ def fly(seed: int) -> dict[str, float]:
     drawing, draw = [0.0], RasterRenderer.draw
 
     def timed(*arguments: Any, **options: Any) -> Any:
-        begun = time.process_time()
+        begun = time.thread_time()
         try:
             return draw(*arguments, **options)
         finally:
-            drawing[0] += time.process_time() - begun
+            drawing[0] += time.thread_time() - begun
 
     with mock.patch.object(RasterRenderer, "draw", timed):
         diagram = make_navigation_diagram(scenario, replace={"goal_selector": Route()})
@@ -109,12 +109,12 @@ def _watched(simulator: Simulator, diagram: Any, drawing: list[float]) -> dict[s
     errors, moving, cpu, way = [], 0.0, 0.0, 0.0
     last = np.array(output("station", "cheat_X_WB").translation())
     while output("navigation", "navigation_status").n < len(ROUTE):
-        begun, drawn, at = time.process_time(), drawing[0], last
+        begun, drawn, at = time.thread_time(), drawing[0], last
         spent = 0.0
         for _ in range(round(CHUNK / SAMPLE)):
-            begun = time.process_time()
+            begun = time.thread_time()
             reason = simulator.AdvanceTo(root.get_time() + SAMPLE).reason()
-            spent += time.process_time() - begun
+            spent += time.thread_time() - begun
             if reason == SimulatorStatus.ReturnReason.kReachedTerminationCondition:
                 raise RuntimeError(output("episode_monitor", "metrics").cause)
             last = np.array(output("station", "cheat_X_WB").translation())

@@ -43,10 +43,10 @@ class FlightConfig:
     travel_factor: float = 3.0
     # The voxel map: side of a voxel, range of depth, every so many rows and columns of an image.
     resolution: float = 0.1
-    max_range: float = 6.0
+    max_range: float = 5.0
     stride: int = 8
     # It is updated after this much travel or turning (degrees); at rest this often (seconds).
-    travel: float = 0.5
+    travel: float = 0.7
     turn_degrees: float = 20.0
     rest_period: float = 2.0
     wind: WindConfig = dc.field(default_factory=WindConfig)
