@@ -15,6 +15,7 @@ from unilavira_drake.cli.progress import Progress
 from unilavira_drake.errors import RenderingError
 from unilavira_drake.messages import LanguageAction, NavigationStatus, TodoItem, TodoList
 from unilavira_drake.recording.result import result_from_json
+from unilavira_drake.scenario_loading import load_scenario
 
 
 @pytest.fixture(autouse=True)
@@ -130,3 +131,16 @@ def test_the_list_is_printed_when_it_changes() -> None:
         "! item 2 stays open",
         "failed: stuck",
     ]
+
+
+@pytest.mark.usefixtures("_no_preflight")
+def test_a_robot_is_chosen_by_its_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "walk"
+    arguments = ["--robot", "unitree_g1", "--set", "robot.max_speed=0.35", "--max-decisions", "1"]
+    assert main(["run", "--scenario", "flat", *arguments, "--out", str(out)]) == 0
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    assert result["robot"] == "unitree_g1"
+    robot = load_scenario(str(out / "scenario.yaml")).robot
+    assert (type(robot).__name__, robot.max_speed) == ("UnitreeG1", 0.35)
+    assert main(["scenarios"]) == 0
+    assert "unitree_g1, unitree_go1" in capsys.readouterr().out

@@ -41,8 +41,10 @@ class PlanarPose(LeafSystem):
         self._height = list(joints).index(HEIGHT_JOINT) if HEIGHT_JOINT in joints else None
         self._count = len(joints)
         self._joint_state = vector_input(self, "joint_state", 2 * self._count)
-        self.DeclareAbstractOutputPort("X_WB", Value[RigidTransform], self._calc_pose)
-        self.DeclareVectorOutputPort("twist", BasicVector(6), self._calc_twist)
+        # Without it time itself would count, which changes at every tick of anything.
+        ticket = {self.input_port_ticket(self.GetInputPort("joint_state").get_index())}
+        self.DeclareAbstractOutputPort("X_WB", Value[RigidTransform], self._calc_pose, ticket)
+        self.DeclareVectorOutputPort("twist", BasicVector(6), self._calc_twist, ticket)
 
     def _calc_pose(self, context: Any, output: Any) -> None:
         state = self._joint_state(context).tolist()

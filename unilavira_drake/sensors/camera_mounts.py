@@ -39,10 +39,11 @@ class CameraMounts(LeafSystem):
         self._port = self.DeclareAbstractInputPort(
             "body_poses", AbstractValue.Make([RigidTransform()])
         )
+        ticket = {self.input_port_ticket(self._port.get_index())}
         for view, frame in frames.items():
             mount = (frame.body().index(), frame.GetFixedPoseInBodyFrame())
             self.DeclareAbstractOutputPort(
-                f"{view}.X_BC", Value[RigidTransform], functools.partial(self._calc, mount)
+                f"{view}.X_BC", Value[RigidTransform], functools.partial(self._calc, mount), ticket
             )
 
     def _calc(self, mount: tuple[Any, RigidTransform], context: Context, output: Any) -> None:
