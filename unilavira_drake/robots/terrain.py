@@ -23,8 +23,8 @@ STIFFNESS, DAMPING, EFFORT = 400.0, 40.0, 1000.0
 """Gains and limit of the height joint for each kilogram that it carries, N/m, N s/m and N: it is a
 tenth of a second behind the ground."""
 GRAVITY = 9.81
-"""m/s^2; the joint carries the weight.  A body without any at rest defeats the contact solver, which
-has no force then by which to judge what is small."""
+"""m/s^2; the joint carries the weight.  A body at rest without any defeats the contact solver: it
+has no force by which to judge what is small."""
 
 
 class TerrainFollower(LeafSystem):
