@@ -26,7 +26,7 @@ AHEAD = 1.5
 BEHIND = 0.6
 """Cells so far behind the robot are free, metres."""
 USUAL_SLOPE = 0.7
-"""Rise over run, until the robot's own way tells."""
+"""Rise over run, unless the robot's own way was steeper."""
 KNOWN_AFTER = 0.8
 """The robot's way tells the slope after so much of it, metres."""
 STEP = 0.4
@@ -126,5 +126,6 @@ def corridor_at(
     slope = 0.0
     if goal.kind == "climb":
         rise = place[2] - goal.p_WG[2]
-        slope = rise / along if along > KNOWN_AFTER and rise > 0.1 else USUAL_SLOPE
+        # Behind a landing it goes on as steeply as before.
+        slope = max(USUAL_SLOPE, rise / along if along > KNOWN_AFTER else 0.0)
     return StairCorridor(place, goal.p_WG[:2], goal.heading, slope, half_width)

@@ -41,6 +41,10 @@ MOVING_FREE_STEP = 10
 """There a thing in a place that was never seen free is forgotten after so few looks."""
 
 
+SWAY = 0.1
+"""Beside its footprint a robot on stairs needs so much room to keep to their axis, metres."""
+
+
 @dc.dataclass(frozen=True)
 class MapperState(Message):
     """The map, all storeys, and the pose and time of the latest integration."""
@@ -186,7 +190,7 @@ class OccupancyMapper(Level):
         goal = self._goal.optional(context)
         if goal is None or goal.kind not in STAIR_KINDS.values() or goal.n != state.occupancy.n:
             return None
-        width = self._parameters.footprint_radius
+        width = self._parameters.footprint_radius + SWAY
         place = (float(X_WB[0, 3]), float(X_WB[1, 3]), float(X_WB[2, 3]) - self._base_height)
         return corridor_at(goal, place, half_width=width)
 

@@ -22,6 +22,9 @@ GroundHeight = Callable[[float, float, float], float]
 STIFFNESS, DAMPING, EFFORT = 400.0, 40.0, 1000.0
 """Gains and limit of the height joint for each kilogram that it carries, N/m, N s/m and N: it is a
 tenth of a second behind the ground."""
+GRAVITY = 9.81
+"""m/s^2; the joint carries the weight.  A body at rest without any defeats the contact solver: it
+has no force by which to judge what is small."""
 
 
 class TerrainFollower(LeafSystem):
@@ -79,6 +82,8 @@ class TerrainFollower(LeafSystem):
         state: Any = self._joint_state(context)
         x, y, z = (float(state[index]) for index in self._place)
         height = self._ground_height(x, y, z) if math.isfinite(x + y + z) else z
+        # The servo sinks under the weight by this much.
+        height += GRAVITY / STIFFNESS
         desired: Any = self._desired(context)
         half = len(desired) // 2
         positions = np.insert(desired[:half], self._slot, height)
@@ -139,7 +144,7 @@ def follow_terrain(
     model_instance: ModelInstanceIndex,
     ground: tuple[GeometryId, ...],
 ) -> None:
-    """Lets nothing but the terrain carry a climbing robot: it neither falls nor bumps into steps.
+    """Lets a climbing robot pass through the geometry of the ground: no step stops it.
 
     Args:
         plant: not yet finalized.
@@ -147,7 +152,6 @@ def follow_terrain(
         model_instance: of the robot.
         ground: geometry of steps and floors, see ``add_scenery``.
     """
-    plant.set_gravity_enabled(model_instance, False)
     own = GeometrySet()
     for body in plant.GetBodyIndices(model_instance):
         own.Add(plant.GetBodyFrameIdOrThrow(body))
