@@ -25,7 +25,8 @@ from robot_recording import record
 from robot_stage import Point, Stage, look_at, studio
 
 from unilavira_drake import load_scenario
-from unilavira_drake.scenario import Scenario, robot_kinds
+from unilavira_drake.scenario import Scenario
+from unilavira_drake.scenario_loading import robot_setting
 from unilavira_drake.station import make_navigation_station
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.world import World
@@ -46,17 +47,18 @@ VANTAGE = (4.3, 3.5, -2.6)
 class Entry:
     """How a robot is shown.
 
-    ``command`` and ``seconds`` say what it does until its picture is taken, from ``start``;
-    ``task`` is what it is recorded at.
+    ``speed`` and ``seconds`` say what it does until its picture is taken, from ``start`` at
+    ``height``; ``task`` is what it is recorded at.
     """
 
     title: str
-    command: tuple[float, ...]
+    speed: float
     seconds: float
     start: tuple[float, float, float]
     eye: Point
     target: Point
     fov_degrees: float
+    height: float = 0.0
     scenario: str = "flat"
     task: str = "couch"
 
@@ -64,7 +66,7 @@ class Entry:
 ENTRIES = {
     "cobot_magic": Entry(
         title="CobotMagic",
-        command=(0.4, 0.0, 0.0),
+        speed=0.4,
         seconds=0.5,
         start=(3.0, 3.4, -1.5),
         eye=(4.2, 0.75, 1.2),
@@ -73,7 +75,7 @@ ENTRIES = {
     ),
     "unitree_go1": Entry(
         title="UnitreeGo1",
-        command=(0.6, 0.0, 0.0),
+        speed=0.6,
         seconds=1.45,
         start=(13.75, 8.4, -2.65),
         eye=(12.1, 7.0, 0.55),
@@ -82,29 +84,42 @@ ENTRIES = {
     ),
     "unitree_g1": Entry(
         title="UnitreeG1",
-        command=(0.4, 0.0, 0.0),
+        speed=0.4,
         seconds=2.3,
         start=(2.5, 8.75, -0.95),
         eye=(4.6, 6.85, 1.3),
         target=(2.55, 8.0, 0.60),
         fov_degrees=66.0,
     ),
+    "quadrotor": Entry(
+        title="Quadrotor",
+        speed=1.0,
+        seconds=0.5,
+        start=(2.9, 3.0, -1.0),
+        eye=(3.75, 1.7, 1.6),
+        target=(2.75, 3.1, 1.05),
+        fov_degrees=56.0,
+        height=1.25,
+    ),
 }
 
 
 def scenario_of(name: str, file: str = "apartment", task: str = "") -> Scenario:
     """Returns a scenario with another robot in it."""
-    tag = robot_kinds()[name].__name__
-    overlay = f"{{robot: !{tag} {{}}, task: {{text: '{'@' * bool(task)}{task}'}}}}"
+    overlay = f"{{robot: {robot_setting(name)}, task: {{text: '{'@' * bool(task)}{task}'}}}}"
     return load_scenario(file, overlay=overlay)
 
 
 def posture(name: str, world: World, start: tuple[float, float, float]) -> NDArray[np.float64]:
     """Returns the positions of a robot's joints in the middle of its motion."""
-    entry = ENTRIES[name]
-    station = make_navigation_station(scenario_of(name), world=world, start=start)
+    entry, scenario, (x, y, yaw) = ENTRIES[name], scenario_of(name), start
+    station = make_navigation_station(scenario, world=world, start=start, start_height=entry.height)
     simulator = Simulator(station)
-    station.GetInputPort("base_command").FixValue(simulator.get_mutable_context(), entry.command)
+    command = [entry.speed, 0.0, 0.0]
+    if entry.height:
+        ahead = (x + entry.speed * math.cos(yaw), y + entry.speed * math.sin(yaw), entry.height)
+        command = [*ahead, yaw, 0.0, 0.0, 0.0]
+    station.GetInputPort("base_command").FixValue(simulator.get_mutable_context(), command)
     simulator.AdvanceTo(entry.seconds)
     plant: Any = station.GetSubsystemByName("plant")
     return np.array(plant.GetPositions(plant.GetMyContextFromRoot(simulator.get_context())))
@@ -128,7 +143,9 @@ def views(name: str) -> dict[str, Image.Image]:
         around = {"front": 0.0, "left": 0.5, "back": 1.0, "right": -0.5}
     for view, half_turns in around.items():
         start = (x, y, yaw + math.pi * half_turns)
-        station = make_navigation_station(scenario, world=world, start=start)
+        station = make_navigation_station(
+            scenario, world=world, start=start, start_height=ENTRIES[name].height
+        )
         camera = view if view in scenario.robot.views else "front"
         port = station.GetOutputPort(f"{camera}.color_image")
         image: Any = port.Eval(station.CreateDefaultContext())
@@ -148,7 +165,7 @@ def line_up(names: Sequence[str]) -> Image.Image:
     for index, name in enumerate(names):
         entry = ENTRIES[name]
         # On the way for so long that it comes to stand on its line.
-        before = entry.command[0] * entry.seconds
+        before = 0.0 if entry.height else entry.speed * entry.seconds
         x, y = SPACING * (index - middle) - before * math.cos(yaw), -before * math.sin(yaw)
         places[name] = posture(name, studio(), (x, y, yaw))
     stage.place(places)
@@ -174,7 +191,7 @@ def sheet(names: Sequence[str]) -> Image.Image:
         left = COLUMN * index
         draw.text((left + COLUMN / 2, 12), ENTRIES[name].title, INK, font(16, bold=True), "mt")
         seen = views(name)
-        turned = "" if len(scenario_of(name).robot.views) > 1 else " (one camera, turned)"
+        turned = "" if len(scenario_of(name).robot.views) > 1 else " (one camera, which turns)"
         y = top + caption
         draw.text((left + 4, y - 6), f"front{turned}", PALE, font(12), "ls")
         image.paste(_fitted(seen.pop("front"), (COLUMN - 6, front)), (left + 3, y))
