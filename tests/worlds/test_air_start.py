@@ -74,7 +74,7 @@ def test_bad_starts_name_value_and_remedy(town, text, message):
 
 
 def test_who_does_not_fly_starts_on_the_ground(town):
-    with pytest.raises(TaskError, match="does not fly; give X,Y,YAW"):
+    with pytest.raises(TaskError, match="choose X,Y,YAW, or an aircraft"):
         parse_start_pose("210,40,12,0", town, radius=RADIUS, climbs=False)
     assert parse_start_pose("210,40,0.5", town, radius=RADIUS, climbs=False)[2] == 0.0
 

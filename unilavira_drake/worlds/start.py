@@ -40,17 +40,13 @@ def parse_start_pose(
         text: ROOM, X,Y,YAW or X,Y,Z,YAW.
         world: where the start must be free.
         radius: the robot's, metres; a start keeps at least this clearance.
-        climbs: whether the robot can be at another height than 0: on another floor, or in the air.
+        climbs: whether the robot can stand on another floor than the one at height 0.
 
     Raises:
         TaskError: names the value and the remedy, for malformed text, an unknown room, a place
             outside the world, in a wall or in furniture, and a floor where it cannot stand.
     """
     x, y, floor, yaw = _parsed(text.strip(), world, radius)
-    if floor != 0.0 and not climbs and world.outdoors:
-        raise TaskError(
-            f"start: {text!r} is in the air, and this robot does not fly; give X,Y,YAW."
-        )
     if floor != 0.0 and not climbs:
         remedy = (
             "choose X,Y,YAW, or an aircraft (robot: !Quadrotor {})"
