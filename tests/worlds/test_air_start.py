@@ -73,6 +73,12 @@ def test_bad_starts_name_value_and_remedy(town, text, message):
         parse_start_pose(text, town, radius=RADIUS)
 
 
+def test_who_does_not_fly_starts_on_the_ground(town):
+    with pytest.raises(TaskError, match="choose X,Y,YAW, or an aircraft"):
+        parse_start_pose("210,40,12,0", town, radius=RADIUS, climbs=False)
+    assert parse_start_pose("210,40,0.5", town, radius=RADIUS, climbs=False)[2] == 0.0
+
+
 def test_rooms_have_no_starts_in_the_air():
     with pytest.raises(TaskError, match="no floor lies at height 1"):
         parse_start_pose("2.9,7.4,1.0,0.0", load_world("flat"), radius=0.36)
