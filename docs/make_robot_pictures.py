@@ -61,6 +61,7 @@ class Entry:
     height: float = 0.0
     scenario: str = "flat"
     task: str = "couch"
+    recorded_from: tuple[Point, Point] = ((6.5, -1.0, 9.4), (6.5, 4.5, 0.0))
 
 
 ENTRIES = {
@@ -100,6 +101,9 @@ ENTRIES = {
         target=(2.75, 3.1, 1.05),
         fov_degrees=56.0,
         height=1.25,
+        scenario="town",
+        task="easy_market_fountain",
+        recorded_from=((150.0, -20.0, 110.0), (222.0, 95.0, 0.0)),
     ),
 }
 
@@ -241,7 +245,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if options.what == "portraits":
             portrait(name, options.size).save(folder / f"{name}.jpg", quality=85)
         else:
-            page = record(scenario_of(name, entry.scenario, entry.task), title=entry.title)
+            eye, target = entry.recorded_from
+            scenario = scenario_of(name, entry.scenario, entry.task)
+            page = record(scenario, title=entry.title, eye=eye, target=target)
             (folder / f"{name}.html").write_text(page, encoding="utf-8")
 
 

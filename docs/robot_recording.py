@@ -9,20 +9,23 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Meshcat, MeshcatVisualizer, Rgba
+from pydrake.geometry import Meshcat, MeshcatVisualizer, Rgba, Sphere
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 from pydrake.systems.framework import DiagramBuilder
-from robot_stage import add_robot, dolls_house
+from robot_stage import Point, add_blocks, add_robot, dolls_house
 
 from unilavira_drake import make_navigation_diagram
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.scenery import add_scenery
+from unilavira_drake.worlds.world import World
 
-RATE = 12.0
-"""Pictures a simulated second."""
+RATE, RATE_OUTDOORS = 12.0, 5.0
+"""Pictures a simulated second; legs swing faster than an aircraft flies far."""
+MARK = 3.0
+"""Radius of the ball around what flies in a town, which is too small to be seen, metres."""
 WALLS = 0.6
 """Height of what is left of the walls, metres."""
 CAPTION = (
@@ -43,21 +46,33 @@ new Response(stream).text().then(page => {{
 """
 
 
-def record(scenario: Scenario, *, title: str) -> str:
+def record(scenario: Scenario, *, title: str, eye: Point, target: Point) -> str:
     """Runs a scenario's task with its agent and returns a page that shows the robot's motion.
+
+    It is seen from ``eye`` to ``target``, until a person turns it.
 
     Raises:
         RuntimeError: if the episode did not end by the agent's own stop.
     """
-    motion, way = _motion(scenario)
-    meshcat = _play(scenario, motion, way)
+    world = load_world(scenario.world.name)
+    rate = RATE_OUTDOORS if world.outdoors else RATE
+    motion, way = _motion(scenario, rate)
+    meshcat = _play(scenario.robot.name, world, motion, rate)
+    _set_the_scene(meshcat, way, width=0.8 if world.outdoors else 0.05)
+    if world.outdoors:
+        # Before its pose, which it would forget.
+        meshcat.SetCamera(Meshcat.PerspectiveCamera(fov=55.0, near=0.5, far=2000.0))
+    meshcat.SetCameraPose(eye, target)
+    if world.outdoors:
+        path = f"/drake/visualizer/{scenario.robot.name}/base/mark"
+        meshcat.SetObject(path, Sphere(MARK), Rgba(0.9, 0.35, 0.1, 0.35))
     caption = f"{title}: {html.escape(choose_task(scenario).spec.text)}"
     page = meshcat.StaticHtml().replace("</body>", f'<div style="{CAPTION}">{caption}</div></body>')
     packed = gzip.compress(page.encode(), mtime=0)
     return PAGE.format(title=title, packed=base64.b64encode(packed).decode())
 
 
-def _motion(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _motion(scenario: Scenario, rate: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Returns positions of the joints, one row a picture, and where the robot was, (k, 3)."""
     diagram = make_navigation_diagram(scenario)
     simulator = Simulator(diagram)
@@ -71,7 +86,7 @@ def _motion(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64
         # Copies: what is returned are views.
         motion.append(np.array(plant.GetPositions(plant.GetMyContextFromRoot(root))))
         way.append(np.array(station.GetOutputPort("cheat_X_WB").Eval(context).translation()))
-        over = simulator.AdvanceTo(len(motion) / RATE).reason() == ended
+        over = simulator.AdvanceTo(len(motion) / rate).reason() == ended
     monitor = diagram.GetSubsystemByName("episode_monitor")
     port = monitor.GetOutputPort("metrics")
     metrics: Any = port.Eval(monitor.GetMyContextFromRoot(root))
@@ -80,29 +95,30 @@ def _motion(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64
     return np.array(motion), np.array(way)
 
 
-def _play(scenario: Scenario, motion: NDArray[np.float64], way: NDArray[np.float64]) -> Meshcat:
-    world = load_world(scenario.world.name)
+def _play(robot: str, world: World, motion: NDArray[np.float64], rate: float) -> Meshcat:
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
-    add_scenery(plant, scene_graph, dolls_house(world, WALLS))
-    add_robot(plant, scenario.robot.name, seen=False)
+    if world.outdoors:
+        add_blocks(plant, world)
+    else:
+        add_scenery(plant, scene_graph, dolls_house(world, WALLS))
+    add_robot(plant, robot, seen=False)
     plant.Finalize()
     meshcat = Meshcat()
     MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
-    meshcat.StartRecording(frames_per_second=RATE, set_visualizations_while_recording=False)
+    meshcat.StartRecording(frames_per_second=rate, set_visualizations_while_recording=False)
     for index, positions in enumerate(motion):
-        context.SetTime(index / RATE)
+        context.SetTime(index / rate)
         plant.SetPositions(plant.GetMyMutableContextFromRoot(context), positions)
         diagram.ForcedPublish(context)
     meshcat.StopRecording()
     meshcat.PublishRecording()
-    _set_the_scene(meshcat, way)
     return meshcat
 
 
-def _set_the_scene(meshcat: Meshcat, way: NDArray[np.float64]) -> None:
+def _set_the_scene(meshcat: Meshcat, way: NDArray[np.float64], *, width: float) -> None:
     for path in ("/Grid", "/Axes", "/Lights/PointLightNegativeX", "/Lights/PointLightPositiveX"):
         meshcat.SetProperty(path, "visible", False)
     meshcat.SetProperty("/Background", "top_color", [0.80, 0.87, 0.95])
@@ -111,8 +127,7 @@ def _set_the_scene(meshcat: Meshcat, way: NDArray[np.float64]) -> None:
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.3)
     meshcat.SetProperty("/Lights/FillLight/<object>", "intensity", 2.2)
     meshcat.SetProperty("/Lights/FillLight/<object>", "position", [-5.0, -12.0, 9.0])
-    meshcat.SetCameraPose((6.5, -1.0, 9.4), (6.5, 4.5, 0.0))
-    vertices, faces = ribbon(way, 0.05)
+    vertices, faces = ribbon(way, width)
     meshcat.SetTriangleMesh("/way", vertices, faces, Rgba(0.9, 0.35, 0.1, 1.0))
 
 

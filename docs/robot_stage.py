@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from pydrake.geometry import Box as BoxShape
 from pydrake.geometry import (
     ClippingRange,
     ColorRenderCamera,
@@ -21,7 +22,7 @@ from pydrake.geometry import (
     Role,
     SceneGraph,
 )
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
@@ -29,6 +30,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo
 
 from unilavira_drake.resources import models_path, package_xml
+from unilavira_drake.worlds.palette import PALETTE
 from unilavira_drake.worlds.scenery import add_scenery
 from unilavira_drake.worlds.world import Box, LabelEntry, Room, World
 
@@ -36,6 +38,16 @@ Point = tuple[float, float, float]
 
 UNSEEN = '<drake:perception_properties enabled="false"/>'
 """Hides a robot's body from its own cameras, so from all."""
+SURFACES = {
+    "grass": (0.45, 0.62, 0.36),
+    "asphalt": (0.36, 0.37, 0.39),
+    "paving": (0.72, 0.71, 0.68),
+    "cobbles": (0.66, 0.62, 0.57),
+    "gravel": (0.74, 0.69, 0.59),
+    "sand": (0.87, 0.80, 0.62),
+    "tartan": (0.70, 0.33, 0.26),
+    "water": (0.35, 0.58, 0.80),
+}
 FAR = 60.0
 """Metres to the lamps that fill the shade; point lights cast no shadows in VTK."""
 MATTE = math.pi
@@ -84,6 +96,24 @@ def _cut(boxes: Sequence[Box], height: float) -> tuple[Box, ...]:
             size = (*box.size[:2], high - low)
             kept.append(dc.replace(box, center=(x, y, (low + high) / 2), size=size))
     return tuple(kept)
+
+
+def add_blocks(plant: MultibodyPlant, world: World) -> None:
+    """Adds a town as plain boxes and surfaces: a hundredth of its size, and still a map."""
+    boxes = []
+    for layer, patch in enumerate(world.ground):
+        x_min, y_min, x_max, y_max = patch.rectangle
+        # Later ones lie over earlier ones, by more than a viewer from afar mixes up.
+        top = 0.03 * (layer - len(world.ground))
+        center = ((x_min + x_max) / 2, (y_min + y_max) / 2, top - 0.5)
+        box = Box(center=center, size=(x_max - x_min, y_max - y_min, 1.0))
+        boxes.append((box, SURFACES.get(patch.material, SURFACES["grass"])))
+    for thing in world.objects:
+        boxes += [(box, PALETTE[thing.color]) for box in thing.boxes]
+    for index, (box, color) in enumerate(boxes):
+        X_WB: Any = RigidTransform(RollPitchYaw(0, 0, box.yaw), np.array(box.center))
+        shape, rgba = BoxShape(*box.size), np.array([*color, 1.0])
+        plant.RegisterVisualGeometry(plant.world_body(), X_WB, shape, f"block_{index}", rgba)
 
 
 def add_robot(plant: MultibodyPlant, name: str, *, seen: bool) -> ModelInstanceIndex:
