@@ -139,7 +139,7 @@ def _frontier(variables: LanguageVariables, generator: random.Random) -> str:
     """Returns the direction with the most free floor, less what lies near visited places."""
     scores = []
     for view in variables.views:
-        if view.free_distance < _LEAST_FREE:
+        if view.free_distance < _LEAST_FREE or view.direction not in VIEW_YAW:
             continue
         bearing = math.degrees(VIEW_YAW[view.direction])
         visits = sum(

@@ -99,7 +99,11 @@ def _grounded(request: MllmRequest) -> MllmRequest:
     evidence = tuple(view for view in request.evidence or () if view.direction != DOWN)
     if len(evidence) == len(request.evidence or ()):
         return request
-    return dataclasses.replace(request, evidence=evidence)
+    variables = request.variables
+    if isinstance(variables, LanguageVariables):
+        level = tuple(view for view in variables.views if view.direction != DOWN)
+        variables = dataclasses.replace(variables, views=level)
+    return dataclasses.replace(request, evidence=evidence, variables=variables)
 
 
 def _flight_reply(request: MllmRequest) -> dict[str, Any]:
