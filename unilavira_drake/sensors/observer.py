@@ -36,6 +36,10 @@ from unilavira_drake.ports import (
 from unilavira_drake.sensors.encoding import encode_jpeg, rgb_of
 
 
+LEVEL = math.cos(math.radians(3.0))
+"""Least cosine of the base's tilt at a capture."""
+
+
 @dataclass(frozen=True, eq=False)
 class ObserverState(Message):
     """Published panorama and sweep, and the sweep's frames so far."""
@@ -89,7 +93,7 @@ class Observer(Level):
         sweep_direction: ``left`` or ``right``, the side to which the robot turns to look around.
         heading_tolerance: a view is captured within this error of its heading, radians ...
         rest_rate: ... and below this yaw rate (rad/s) ...
-        rest_speed: ... and speed (m/s) ...
+        rest_speed: ... and speed (m/s), and level within 3 degrees ...
         view_deadline: ... or after this many seconds, at whatever heading was reached; the
             frame's pose is the true geometry, so a blocked turn costs coverage, not truth.
         max_age: after a failure a panorama that is older is captured anew though the robot has not
@@ -177,6 +181,8 @@ class Observer(Level):
         twist = self._twist(context)
         time = context.get_time()
         at_rest = abs(twist[2]) < self._rest_rate and np.hypot(*twist[3:5]) < self._rest_speed
+        # An aircraft that brakes is tilted, and so is what it sees.
+        at_rest = at_rest and X_WB[2, 2] > LEVEL
         error = abs(math.remainder(yaw - state.sweep.heading, 2 * math.pi))
         on_heading = error < self._heading_tolerance or not state.sweep.active
         if not (at_rest and on_heading) and time - state.since < self._view_deadline:
