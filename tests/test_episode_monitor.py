@@ -19,6 +19,7 @@ from pydrake.systems.framework import DiagramBuilder
 from unilavira_drake.episode_monitor import EpisodeMonitor
 from unilavira_drake.messages import LanguageAction, NavigationStatus, Panorama
 from unilavira_drake.messages.metrics import CAUSES, EpisodeMetrics
+from unilavira_drake.messages.people import PeopleTruth, PersonTruth
 from unilavira_drake.mllm.reply import Usage
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.scenario import Budgets
@@ -248,6 +249,43 @@ def test_an_unreachable_model_ends_the_episode_before_anything_else():
     bench.tick()
     bench.tick()
     assert bench.metrics.cause == "model_unreachable"
+
+
+def person(gap, *, touched=False, name="person_1"):
+    return PersonTruth(name, gap=gap, touched=touched)
+
+
+def test_people_are_measured_by_the_least_gap_and_the_onsets_of_touches():
+    bench = Bench()
+    for people in (
+        (person(1.5), person(0.9, name="person_2")),
+        (person(0.4), person(2.0, name="person_2")),
+        (person(0.0, touched=True), person(0.0, touched=True, name="person_2")),
+        (person(0.0), person(0.0, touched=True, name="person_2")),
+        (person(0.3), person(0.8, name="person_2")),
+        (person(0.0, touched=True), person(1.0, name="person_2")),
+    ):
+        bench.fix("cheat_people", PeopleTruth(people))
+        bench.tick()
+        bench.tick()
+        if people[0].gap == 0.4:
+            assert bench.metrics.min_person_distance == 0.4
+            assert bench.metrics.person_contacts == 0
+    # Two people at once are one contact: it ends when nobody is touched.
+    assert bench.metrics.person_contacts == 2
+    assert bench.metrics.min_person_distance == 0.0
+    assert bench.metrics.collisions == 0
+
+
+@pytest.mark.parametrize("people", [None, PeopleTruth()])
+def test_where_nobody_walks_nothing_is_said_of_people(people):
+    bench = Bench()
+    if people is not None:
+        bench.fix("cheat_people", people)
+    bench.tick()
+    bench.tick()
+    assert bench.metrics.min_person_distance is None
+    assert bench.metrics.person_contacts == 0
 
 
 def test_every_cause_has_its_sentence():

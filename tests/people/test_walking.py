@@ -124,6 +124,29 @@ def test_polite_people_let_a_robot_pass_that_would_cross_their_way():
     assert walk.pose[0] > 3.0
 
 
+def test_nobody_walks_into_what_a_standing_robot_sweeps_when_it_turns():
+    # It stands beside the way, and its long side leaves room to pass; its corners would not.
+    walk = Walk(dataclasses.replace(PERSON, walk=((0.0, 0.0), (100.0, 0.0))), Manners(patience=99))
+    robot = (2.0, 0.6, 0.0, 0.345, 0.285)
+    walk.go(5.0, robot=robot)
+    assert math.dist(walk.pose[:2], robot[:2]) > math.hypot(0.345, 0.285) + RADIUS
+    assert walk.moving == 0.0
+
+
+def test_who_is_within_that_may_leave_but_not_go_farther_in():
+    robot = RobotSeen(0.0, 0.55, 0.0, 0.345, 0.285)
+    wishes = []
+    for way in (1.0, -1.0):
+        person = dataclasses.replace(PERSON, walk=((0.45, 0.0), (0.45 + 2.0 * way, 0.0)))
+        _, wish = next_step(
+            person, Walker(), Manners(), time=0.0, period=PERIOD, pose=(0.45, 0.0, math.acos(way)),
+            moving=0.0, robot=robot,
+        )  # fmt: skip
+        wishes.append(wish.vx)
+    assert wishes[0] > 0.0
+    assert wishes[1] == pytest.approx(0.0)
+
+
 def test_impolite_people_keep_walking():
     walk = Walk(manners=Manners(polite=False))
     assert walk.go(3.0, robot=(1.0, 0.0))[0] > 2.5

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from unilavira_drake.mapping.occupancy import NEWEST
 from unilavira_drake.messages import OccupancyMap
 from unilavira_drake.robots.drive_limits import DriveLimits
 from unilavira_drake.robots.governor import Governor
@@ -268,12 +269,54 @@ def test_a_lost_pose_stops_translation():
         assert bench.tick((0.8, 0.0, 0.0), pose=lost)[0] == 0.0
 
 
-def test_turning_in_place_is_never_blocked():
+def test_turning_in_place_is_never_blocked_by_things():
     log_odds = np.full((SIDE, SIDE), 5, np.int8)
     bench = Bench(log_odds, map_timeout=math.inf)
     for _ in range(20):
         command = bench.tick((0.5, 0.0, 1.2))
     assert command == pytest.approx([0.0, 0.0, 1.2])
+
+
+def person(x, y):
+    """A map with the cells of someone who was just seen."""
+    log_odds = empty_map()
+    row, column = ((value - low) / RESOLUTION for value, low in zip((y, x), ORIGIN, strict=True))
+    log_odds[int(row) - 1 : int(row) + 2, int(column) - 1 : int(column) + 2] = NEWEST
+    return log_odds
+
+
+@pytest.mark.parametrize("y", [0.45, -0.45])
+def test_a_turn_waits_for_people_within_its_sweep_till_they_are_gone(y):
+    bench = Bench(person(0.0, y), map_timeout=math.inf, newest=NEWEST)
+    for _ in range(20):
+        assert bench.tick((0.0, 0.0, 1.2)) == pytest.approx(np.zeros(3))
+    bench.log_odds = person(0.0, 2.0 * y)
+    bench.fix_map(bench.time)
+    for _ in range(20):
+        command = bench.tick((0.0, 0.0, 1.2))
+    assert command == pytest.approx([0.0, 0.0, 1.2])
+
+
+def test_a_turn_that_meets_someone_ends_by_braking():
+    bench = Bench(empty_map(), map_timeout=math.inf, newest=NEWEST)
+    for _ in range(20):
+        bench.tick((0.0, 0.0, 1.2))
+    bench.log_odds = person(0.0, 0.45)
+    bench.fix_map(bench.time)
+    rates = [bench.tick((0.0, 0.0, 1.2))[2] for _ in range(20)]
+    step = LIMITS.max_yaw_acceleration * LIMITS.period
+    assert np.all(np.diff([1.2, *rates]) >= -step - 1e-9)
+    assert rates[-1] == 0.0
+
+
+def test_things_and_a_lost_pose_hold_no_turn_among_people():
+    near = person(0.0, 0.45)
+    for log_odds, pose in (
+        (np.where(near > 0, 5, near).astype(np.int8), None),
+        (near, RigidTransform([math.nan, 0.0, 0.0])),
+    ):
+        bench = Bench(log_odds, map_timeout=math.inf, newest=NEWEST)
+        assert bench.tick((0.0, 0.0, 1.2), pose=pose)[2] > 0.0
 
 
 def test_it_may_back_away_from_a_wall_it_faces():

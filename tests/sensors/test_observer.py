@@ -136,6 +136,28 @@ def test_unmoved_robot_reissues_its_frames_with_the_outcome() -> None:
     assert again.frames is first.frames
 
 
+@pytest.mark.parametrize(
+    ("state", "age", "anew"),
+    [("failed", 1.0, False), ("failed", 3.0, True), ("arrived", 3.0, False)],
+)
+def test_after_a_failure_old_frames_are_taken_anew_where_people_walk(
+    state: str, age: float, anew: bool
+) -> None:
+    bench = Bench(max_age=2.0)
+    bench.sweep(0.0, 0.0)
+    first = bench.output("panorama")
+    bench.run(age)
+    bench.status(1, state)
+    bench.run(0.2)
+    assert bench.output("sweep").active == anew
+    bench.sweep(0.0, 0.0)
+    again = bench.output("panorama")
+    assert again.n == 2
+    assert (again.frames is first.frames) == (not anew)
+    # The four words keep their meaning.
+    assert again.yaw == pytest.approx(first.yaw)
+
+
 @pytest.mark.parametrize("heading", [None, 1.2])
 def test_moved_robot_sweeps_from_the_given_or_the_arrival_heading(heading: float | None) -> None:
     bench = Bench()

@@ -18,6 +18,8 @@ FORESIGHT, FORESEEN = 0.25, 10
 """Polite people look so many steps of so many seconds ahead."""
 MARGIN = 0.25
 """What they want to keep between them and the robot, metres."""
+TURNING, TURNING_SOON = 0.10, 4
+"""Metres to keep from what a robot sweeps when it turns, as far as so many steps go."""
 STANDING = 0.05
 """A slower robot stands, metres a second."""
 REACHED = 0.10
@@ -80,6 +82,11 @@ class RobotSeen(Message):
         u = min(max(c * dx + s * dy, -self.half_length), self.half_length)
         v = min(max(c * dy - s * dx, -self.half_width), self.half_width)
         return c * u - s * v - dx, s * u + c * v - dy
+
+    def reach(self, x: float, y: float, after: float = 0.0) -> float:
+        """Returns metres from (x, y) to the disc that it sweeps when it turns in place."""
+        dx, dy = x - self.x - self.vx * after, y - self.y - self.vy * after
+        return math.hypot(dx, dy) - math.hypot(self.half_length, self.half_width)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -191,6 +198,12 @@ def _must_wait(
     if near < manners.stop_distance and turn < AHEAD:
         return True
     vx, vy = speed * math.cos(bearing), speed * math.sin(bearing)
+    # A robot that stands may turn at any moment.
+    now = robot.reach(x, y)
+    for k in range(1, TURNING_SOON + 1):
+        after = k * FORESIGHT
+        if robot.reach(x + vx * after, y + vy * after, after) < min(RADIUS + TURNING, now):
+            return True
     if math.hypot(robot.vx, robot.vy) < STANDING:
         return False
     for k in range(1, FORESEEN + 1):

@@ -23,6 +23,8 @@ from unilavira_drake.robots.stopping import (
 
 MOVING = 0.05
 """A base that measures a higher speed must see its pose change, m/s."""
+SWEPT = 0.05
+"""People nearer than this to what a base sweeps when it turns in place make it wait, metres."""
 
 
 class Governor(LeafSystem):
@@ -34,7 +36,8 @@ class Governor(LeafSystem):
     * The base translates only on a map not older than ``map_timeout``, with a pose and a twist that
       are finite and a pose that changes when the twist says so, and only so fast that it still
       stops (v^2 / 2a and one period) before its leading edge meets an occupied cell.
-    * Turning in place is never blocked: it is how a base gets out of a corner.
+    * Turning in place is never blocked by things: it is how a base gets out of a corner.  People
+      go away, so while one is seen within what it would sweep, it waits.
     * Zero is reached by braking, never by a jump.
 
     The state is the previous command, and when the pose last changed.  At rest under a zero
@@ -144,6 +147,8 @@ class Governor(LeafSystem):
                 speed = math.copysign(least, speed)
             else:
                 speed, lateral = speed * least / wanted, lateral * least / wanted
+        if self._newest and rate != 0.0 and speed == lateral == 0.0 and self._sweeps(context):
+            rate = approach(old_rate, 0.0, turn_step)
         command = np.array([speed, lateral, rate])
         discrete_state.set_value(self._command_index, command)  # type: ignore[arg-type]
 
@@ -162,6 +167,19 @@ class Governor(LeafSystem):
                 if since is not None and time - since > self._reply_timeout:
                     return 0.0, 0.0, 0.0
         return speed, lateral, rate
+
+    def _sweeps(self, context: Context) -> bool:
+        """Whether a person is seen within the disc that a turn in place would sweep."""
+        map_ = self._map(context)
+        x, y = self._pose(context).translation()[:2].tolist()
+        if not math.isfinite(x + y):
+            return False
+        reach = math.hypot(self._footprint.half_length, self._footprint.half_width) + SWEPT
+        log_odds, first = map_.around(x, y, reach)
+        cells = np.argwhere(log_odds == self._newest) + first + 0.5
+        rows, columns = cells.T * map_.resolution
+        away = np.hypot(map_.origin[0] + columns - x, map_.origin[1] + rows - y)
+        return bool((away < reach).any())
 
     def _allowed_speed(
         self,
