@@ -35,7 +35,6 @@ from unilavira_drake.ports import (
 )
 from unilavira_drake.sensors.encoding import encode_jpeg, rgb_of
 
-
 LEVEL = math.cos(math.radians(3.0))
 """Least cosine of the base's tilt at a capture."""
 
@@ -180,7 +179,8 @@ class Observer(Level):
         yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
         twist = self._twist(context)
         time = context.get_time()
-        at_rest = abs(twist[2]) < self._rest_rate and np.hypot(*twist[3:5]) < self._rest_speed
+        speed = math.hypot(*twist[3:6].tolist())
+        at_rest = abs(twist[2]) < self._rest_rate and speed < self._rest_speed
         # An aircraft that brakes is tilted, and so is what it sees.
         at_rest = at_rest and X_WB[2, 2] > LEVEL
         error = abs(math.remainder(yaw - state.sweep.heading, 2 * math.pi))
