@@ -24,6 +24,7 @@ from unilavira_drake.mllm.latency import (
 )
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
 from unilavira_drake.people.crowd import make_crowd, with_people
+from unilavira_drake.robots.robot import GroundRobot
 from unilavira_drake.scenario import (
     ABLATIONS,
     GROUNDERS,
@@ -222,6 +223,11 @@ def _check_order(scenario: Scenario) -> None:
 
 def _check_people(scenario: Scenario, world: World, robot: tuple[float, float]) -> None:
     people = scenario.people
+    if people.count and not isinstance(scenario.robot, GroundRobot):
+        raise ScenarioError(
+            f"people.count: {people.count} people, but only robots on the ground know of people; "
+            "set it to 0, or choose such a robot."
+        )
     for low, high in (("min_speed", "max_speed"), ("min_pause", "max_pause")):
         if getattr(people, low) > getattr(people, high):
             raise ScenarioError(

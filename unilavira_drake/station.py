@@ -116,7 +116,10 @@ def make_navigation_station(
         world = load_world(scenario.world.name, mirror=scenario.world.mirror)
     if start is None:
         x, y, start_height, yaw = parse_start_pose(
-            choose_task(scenario).start, world, radius=scenario.robot.turning_radius
+            choose_task(scenario).start,
+            world,
+            radius=scenario.robot.turning_radius,
+            climbs=scenario.robot.leaves_the_ground,
         )
         start = (x, y, yaw)
     builder = DiagramBuilder()
