@@ -30,6 +30,7 @@ from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.ports import Level, image_input, message_input, pose_input
 from unilavira_drake.resources import package_xml
 from unilavira_drake.robots.actuation import add_actuation, set_start
+from unilavira_drake.robots.flight_config import FlightConfig
 from unilavira_drake.robots.ground_tracking import project
 from unilavira_drake.robots.robot import Robot
 from unilavira_drake.sensors.rig import front_intrinsics
@@ -135,6 +136,7 @@ def drive(
             intrinsics=front_intrinsics(robot),
             mapping=MappingConfig(),
             planning=PlanningConfig(),
+            flight=FlightConfig(),
             tick=0.1,
             time_step=TIME_STEP,
             replace={"mapper": KnownMap(map_of(walls))},

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, LeafSystem
 
 from unilavira_drake.kernels import kernel
@@ -34,7 +34,7 @@ class FloatingBase(LeafSystem):
     def __init__(self) -> None:
         super().__init__()
         self.set_name("floating_base")
-        pose_in_world(np.eye(13)[0])
+        rotation_in_world(np.eye(13)[0])
         twist_in_body(np.eye(13)[0])
         self._body_state = vector_input(self, "body_state", 13)
         # Without a word Drake would take both to change with time as well.
@@ -45,16 +45,19 @@ class FloatingBase(LeafSystem):
         self.DeclareVectorOutputPort("twist", BasicVector(6), self._calc_twist, state)
 
     def _calc_pose(self, context: Any, output: Any) -> None:
-        pose: Any = pose_in_world(self._body_state(context))
-        output.set_value(RigidTransform(pose))
+        state: Any = self._body_state(context)
+        # In place: a new RigidTransform of a matrix costs more than all the rest.
+        pose = output.get_mutable_value()
+        pose.set_rotation(RotationMatrix(rotation_in_world(state)))
+        pose.set_translation(state[4:7])
 
     def _calc_twist(self, context: Any, output: Any) -> None:
         output.SetFromVector(twist_in_body(self._body_state(context)))
 
 
 @kernel
-def pose_in_world(body_state: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the pose of a floating body; (3, 4)."""
+def rotation_in_world(body_state: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the attitude of a floating body; (3, 3)."""
     # The integration of a discrete plant leaves the quaternion a little longer or shorter than 1.
     w, x, y, z = body_state[0], body_state[1], body_state[2], body_state[3]
     length = math.sqrt(w * w + x * x + y * y + z * z)
@@ -62,7 +65,7 @@ def pose_in_world(body_state: NDArray[np.float64]) -> NDArray[np.float64]:
     # As Drake does it, to the last bit.
     two = 2.0 / ((x * x + z * z) + (y * y + w * w))
     sx, sy, sz = two * x, two * y, two * z
-    out = np.empty((3, 4))
+    out = np.empty((3, 3))
     out[0, 0] = 1.0 - sy * y - sz * z
     out[0, 1] = sy * x - sz * w
     out[0, 2] = sz * x + sy * w
@@ -72,7 +75,6 @@ def pose_in_world(body_state: NDArray[np.float64]) -> NDArray[np.float64]:
     out[2, 0] = sz * x - sy * w
     out[2, 1] = sz * y + sx * w
     out[2, 2] = 1.0 - sx * x - sy * y
-    out[:, 3] = body_state[4:7]
     return out
 
 
