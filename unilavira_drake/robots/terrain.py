@@ -111,8 +111,8 @@ def climbing_model(path: Path) -> str:
     child = None if yaw is None else yaw.find("child")
     if model is None or child is None:
         raise ScenarioError(
-            f"robot.model: {str(path)!r} has no joint base_yaw in the model of an SDF; a robot with "
-            "can_climb: true needs one. Convert it to SDF, or give robot.can_climb: false."
+            f"robot.model: {str(path)!r} has no joint base_yaw in the model of an SDF; a robot "
+            "with can_climb: true needs one. Convert it to SDF, or give robot.can_climb: false."
         )
     for uri in root.iter("uri"):
         if uri.text and "://" not in uri.text:
