@@ -198,8 +198,7 @@ def _add_robot(plant: MultibodyPlant, robot: Robot) -> ModelInstanceIndex:
     if not path.is_file():
         raise ScenarioError(f"robot.model: no file {model!r}; check the path.")
     if robot.can_climb:
-        text = climbing_model(path.read_text(encoding="utf-8"))
-        (model_instance,) = parser.AddModelsFromString(text, "sdf")
+        (model_instance,) = parser.AddModelsFromString(climbing_model(path), "sdf")
     else:
         (model_instance,) = parser.AddModelsFromUrl(model) if known else parser.AddModels(path)
     return model_instance
