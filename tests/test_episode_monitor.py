@@ -30,9 +30,9 @@ PERIOD = 0.1
 class Bench:
     """A monitor whose inputs are set by hand, one tick at a time."""
 
-    def __init__(self, goal_distance=None, **budgets):
+    def __init__(self, goal_distance=None, flies=False, **budgets):
         self.monitor = EpisodeMonitor(
-            period=PERIOD, budgets=Budgets(**budgets), goal_distance=goal_distance
+            period=PERIOD, budgets=Budgets(**budgets), goal_distance=goal_distance, flies=flies
         )
         self.simulator = Simulator(self.monitor)
         self.context = self.simulator.get_mutable_context()
@@ -95,6 +95,32 @@ def test_the_start_is_no_step_and_trembling_adds_nothing():
     assert bench.metrics.path_length == 0.0
     assert bench.metrics.position == pytest.approx((5.0, 7.0), abs=1e-3)
     assert bench.metrics.goal_distance is None
+
+
+def test_an_aircraft_that_hovers_in_gusts_goes_nowhere():
+    bench = Bench(goal_distance=lambda x, y, z: math.hypot(x, y), flies=True, stall=10.0)
+    rng = np.random.default_rng(1)
+    while not bench.metrics.ended and bench.context.get_time() < 15.0:
+        bench.pose(*(3.0 + rng.uniform(-0.08, 0.08, 2)), rng.uniform(-0.08, 0.08))
+        bench.tick()
+    assert bench.metrics.path_length == 0.0
+    assert bench.metrics.cause == "stalled"
+    assert bench.metrics.time == pytest.approx(10.0, abs=0.3)
+    assert bench.metrics.min_goal_distance < math.hypot(3.0, 3.0)
+
+
+def test_an_aircraft_that_flies_slowly_gets_on():
+    bench = Bench(flies=True, stall=10.0)
+    for k in range(300):
+        bench.pose(0.01 * k, 0.0)
+        bench.tick()
+    assert not bench.metrics.ended
+    assert bench.metrics.path_length == pytest.approx(2.99, abs=0.26)
+    assert bench.metrics.position == pytest.approx((2.99, 0.0), abs=0.02)
+    for k in range(300):
+        bench.pose(3.0, 0.0, 0.02 * k)
+        bench.tick()
+    assert not bench.metrics.ended
 
 
 def test_a_stop_is_written_in_one_tick_and_ends_in_the_next():
@@ -296,13 +322,13 @@ def test_every_cause_has_its_sentence():
     assert EpisodeMetrics(cause="stopped").ended
 
 
-def watch(build):
+def watch(build, *, flies=False, status=None):
     """Runs a plant that ``build`` fills for 1.5 s under a monitor; returns its metrics."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, 0.01)
     prepare = build(plant)
     plant.Finalize()
-    monitor = builder.AddSystem(EpisodeMonitor(period=PERIOD, budgets=Budgets()))
+    monitor = builder.AddSystem(EpisodeMonitor(period=PERIOD, budgets=Budgets(), flies=flies))
     contacts = plant.get_contact_results_output_port()
     builder.Connect(contacts, monitor.GetInputPort("contact_results"))
     diagram = builder.Build()
@@ -313,7 +339,7 @@ def watch(build):
         ("cheat_X_WB", RigidTransform()),
         ("language_action", LanguageAction()),
         ("panorama", Panorama()),
-        ("navigation_status", NavigationStatus()),
+        ("navigation_status", status or NavigationStatus()),
     ):
         monitor.GetInputPort(name).FixValue(own, AbstractValue.Make(value))
     simulator.AdvanceTo(1.5)
@@ -364,3 +390,22 @@ def test_standing_on_the_floor_is_none():
     metrics = watch(ball_on_the_floor)
     assert metrics.collisions == 0
     assert metrics.max_contact_force == 0.0
+
+
+@pytest.mark.parametrize(
+    ("status", "collisions"),
+    [
+        (NavigationStatus(0, "moving"), 0),
+        (NavigationStatus(0, "arrived"), 1),
+        (NavigationStatus(3, "moving"), 1),
+    ],
+)
+def test_the_floor_carries_an_aircraft_only_until_it_has_taken_off(status, collisions):
+    metrics = watch(ball_on_the_floor, flies=True, status=status)
+    assert metrics.collisions == collisions
+    assert (metrics.max_contact_force > 40.0) == bool(collisions)
+
+
+def test_an_aircraft_that_stands_may_bump_into_a_wall_all_the_same():
+    metrics = watch(sliding_block(0.2), flies=True, status=NavigationStatus(0, "moving"))
+    assert metrics.collisions == 1

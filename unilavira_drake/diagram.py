@@ -151,7 +151,10 @@ def make_navigation_diagram(
     wiring.add(
         "episode_monitor",
         lambda: EpisodeMonitor(
-            period=scenario.tick, budgets=task.budgets, goal_distance=goal_distance
+            period=scenario.tick,
+            budgets=task.budgets,
+            goal_distance=goal_distance,
+            flies=isinstance(scenario.robot, Quadrotor),
         ),
     )
     _close_the_ring(wiring, scenario.robot.views)

@@ -28,10 +28,15 @@ SHORTEST_STEP = 0.001
 """Path length counts steps of at least this length, metres."""
 SMALLEST_TURN = math.radians(1.0)
 """A turn of this much is motion, radians."""
+SHORTEST_FLIGHT = 0.25
+"""An aircraft wavers in gusts: its path has steps of at least this length, metres."""
+LEAST_YAW = math.radians(10.0)
+"""A turn of this much is motion of an aircraft, radians."""
 CONTACT_FORCE = 1.0
 """A weaker contact is none, newtons."""
 FLOOR_NORMAL = math.cos(math.radians(45.0))
-"""A contact whose normal is more upright than this carries the robot: no collision."""
+"""A contact whose normal is more upright than this carries the robot: no collision.  An aircraft is
+carried only until it has taken off."""
 
 DECISION_CALLS = ("decide", "recover")
 """The calls that choose a robot action."""
@@ -47,6 +52,8 @@ class MonitorState(Message):
     action: int = 0
     status: tuple[int, str] = (0, "arrived")
     yaw: float = 0.0
+    counted: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the latest step of the path ended, metres."""
     in_contact: bool = False
     on_person: bool = False
     usage: tuple[ModelUsage, ...] = ()
@@ -66,7 +73,8 @@ class EpisodeMonitor(Level):
     money is what is known to be spent.
 
     Contacts are sampled once per period: a touch shorter than that can be missed, and two touches
-    with a shorter gap count as one.  A robot that pushes against something is always seen.
+    with a shorter gap count as one.  A robot that pushes against something is always seen.  What
+    carries a robot on the ground is no collision; an aircraft that has taken off touches nothing.
 
     .. pydrake_system::
 
@@ -88,6 +96,7 @@ class EpisodeMonitor(Level):
         budgets: decisions, simulated time, stall time, and what the models may use.
         goal_distance: metres from a place (x, y, z) to the goal; None when the episode is not
             scored.
+        flies: whether the robot is an aircraft.
     """
 
     def __init__(
@@ -96,12 +105,14 @@ class EpisodeMonitor(Level):
         period: float,
         budgets: Budgets,
         goal_distance: Callable[[float, float, float], float] | None = None,
+        flies: bool = False,
     ) -> None:
         # It writes whenever the robot moved, so it belongs to the plant's moments: see OFFSET.
         super().__init__(MonitorState(), period=period, offset=0.0)
         # Plain numbers: a caller's later change of the scenario must not reach a built System.
         self._budgets = dataclasses.replace(budgets)
         self._goal_distance = goal_distance
+        self._flies = flies
         self._pose = pose_input(self, "cheat_X_WB")
         self._action = message_input(self, "language_action", LanguageAction())
         self._panorama = message_input(self, "panorama", Panorama())
@@ -137,7 +148,8 @@ class EpisodeMonitor(Level):
         yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
         metrics = state.metrics
         step = metrics.distance_from(x, y, z) if state.started else 0.0
-        turned = abs(math.remainder(yaw - state.yaw, 2 * math.pi)) >= SMALLEST_TURN
+        least_turn = LEAST_YAW if self._flies else SMALLEST_TURN
+        turned = abs(math.remainder(yaw - state.yaw, 2 * math.pi)) >= least_turn
         if state.started and step < SHORTEST_STEP:
             if not turned:
                 return state
@@ -150,17 +162,27 @@ class EpisodeMonitor(Level):
                 distance,
                 math.inf if metrics.min_goal_distance is None else metrics.min_goal_distance,
             )
+        counted = state.counted
+        if self._flies and state.started:
+            step = math.dist(counted, (x, y, z))
+        counts = not (self._flies and state.started) or step >= SHORTEST_FLIGHT
         metrics = dataclasses.replace(
             metrics,
             x=x,
             y=y,
             z=z,
-            path_length=metrics.path_length + step,
+            path_length=metrics.path_length + (step if counts else 0.0),
             goal_distance=distance,
             min_goal_distance=nearest,
-            progress_time=time,
+            progress_time=time if counts or turned else metrics.progress_time,
         )
-        return dataclasses.replace(state, metrics=metrics, yaw=yaw, started=True)
+        return dataclasses.replace(
+            state,
+            metrics=metrics,
+            yaw=yaw if turned or not self._flies or not state.started else state.yaw,
+            counted=(x, y, z) if counts else counted,
+            started=True,
+        )
 
     def _follow_ring(
         self, context: Context, state: MonitorState, action: LanguageAction, time: float
@@ -179,7 +201,9 @@ class EpisodeMonitor(Level):
         )
 
     def _follow_contacts(self, context: Context, state: MonitorState) -> MonitorState:
-        force = _collision_force(self._contacts(context))
+        status = self._status(context)
+        carried = not self._flies or (status.n == 0 and not status.terminal)
+        force = _collision_force(self._contacts(context), carried=carried)
         touching = force > CONTACT_FORCE
         metrics = state.metrics
         if touching == state.in_contact and force <= metrics.max_contact_force:
@@ -260,12 +284,12 @@ def _asks_again(state: MonitorState, action: LanguageAction) -> bool:
     return done and action.tool != "double_check" and not action.confirmed
 
 
-def _collision_force(contacts: ContactResults) -> float:
-    """The largest force of a contact that is not the floor's, newtons."""
+def _collision_force(contacts: ContactResults, *, carried: bool) -> float:
+    """The largest force of a contact, newtons; not the floor's while that carries the robot."""
     largest = 0.0
     for index in range(contacts.num_point_pair_contacts()):
         info = contacts.point_pair_contact_info(index)
-        if abs(info.point_pair().nhat_BA_W[2]) < FLOOR_NORMAL:
+        if not carried or abs(info.point_pair().nhat_BA_W[2]) < FLOOR_NORMAL:
             fx, fy, fz = info.contact_force()
             largest = max(largest, math.sqrt(fx * fx + fy * fy + fz * fz))
     return largest

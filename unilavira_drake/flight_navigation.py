@@ -76,6 +76,8 @@ def make_flight_navigation(
         wiring.take_input(f"{view}.X_BC", "mapper")
     wiring.take_input("pose_estimate", "mapper", "planner", "controller", "governor")
     wiring.take_input("twist", "controller", "governor")
+    for role in ("language", "vision"):
+        wiring.take_wanted(f"{role}_awaited", "governor")
     wiring.give_output("governor", "base_command")
     wiring.give_output("planner", "navigation_status")
     wiring.give_output("planner", "path")

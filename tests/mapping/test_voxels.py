@@ -259,3 +259,18 @@ def test_maps_that_make_no_sense_are_refused(look):
         VoxelMap(tiles={(0, 0, 0): np.zeros((3, 3, 3), np.int8)})
     with pytest.raises(ValueError, match=r"0\.5 m"):
         looked(VoxelMap(version=1, resolution=0.5))
+
+
+@pytest.mark.parametrize("blind", [0.0, np.nan, np.inf, -1.0])
+def test_the_time_of_a_map_is_that_at_which_something_was_seen(blind):
+    seen = DepthView(np.full((9, 12), 2.0, np.float32), LENS, np.eye(4))
+    first = looked(VoxelMap(), seen, time=3.0)
+    dead = DepthView(np.full((9, 12), blind, np.float32), LENS, np.eye(4))
+    lost = DepthView(seen.depth, LENS, np.full((4, 4), np.nan))
+    for views in ((), (dead,), (lost,), (dead, lost)):
+        later = looked(first, *views, n=2, time=9.0)
+        assert (later.time, later.n, later.version) == (3.0, 2, 2)
+        assert later.tiles == first.tiles
+    assert looked(first, dead, seen, time=9.0).time == 9.0
+    sky = DepthView(np.full((9, 12), np.inf, np.float32), LENS, np.eye(4))
+    assert looked(first, sky, far_is_free=True, time=9.0).time == 9.0

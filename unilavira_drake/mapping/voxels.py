@@ -58,14 +58,15 @@ def integrate_voxels(
 ) -> VoxelMap:
     """Returns the map after these views, as a new value with the next version.
 
-    Views that make no sense are left out, and ``rejected`` of the new map says why.
+    Views that make no sense are left out, and ``rejected`` of the new map says why.  Without a
+    single reading in any view the time of the map stays as it was: nothing was seen.
 
     Args:
         voxels: the map so far; version 0 is replaced by an empty one of the right resolution.
         views: depth images with their poses, in any attitude.
         parameters: resolution and range.
         n: number of the latest panorama that is part of the new map.
-        time: simulated time of the new map, seconds.
+        time: simulated time of the views, seconds.
 
     Raises:
         ValueError: if the map has another resolution.
@@ -75,17 +76,17 @@ def integrate_voxels(
             f"the map's voxels are {voxels.resolution:g} m, not {parameters.resolution:g} m"
         )
     tiles = dict(voxels.tiles)
-    rejected = []
+    rejected, seen = [], False
     for number, view in enumerate(views):
         fault = fault_of(view)
         if fault:
             rejected.append(f"view {number}: {fault}")
-        else:
-            _integrate_view(tiles, view, parameters)
+        elif _integrate_view(tiles, view, parameters):
+            seen = True
     return VoxelMap(
         n=n,
         version=voxels.version + 1,
-        time=time,
+        time=time if seen else voxels.time,
         resolution=parameters.resolution,
         tiles=tiles,
         rejected=tuple(rejected),
@@ -94,18 +95,20 @@ def integrate_voxels(
 
 def _integrate_view(
     tiles: dict[tuple[int, int, int], NDArray[Any]], view: DepthView, parameters: VoxelParameters
-) -> None:
-    """Replaces the tiles that the view changes."""
+) -> bool:
+    """Replaces the tiles that the view changes; returns whether the view has any reading."""
     stride, lens = parameters.stride, view.intrinsics
     shape = tuple(-(-(size - stride // 2) // stride) for size in view.depth.shape)
     if min(shape) <= 0:
-        return
+        return False
     camera = np.array([lens.fx, lens.fy, lens.cx, lens.cy])
     limits = np.array(
         [parameters.max_range, parameters.saturation, 1.0 if parameters.far_is_free else 0.0]
     )
     readings, sights = np.empty(shape), np.empty(shape)
     sample(frozen_view(view.depth, np.float32), stride, camera, limits, readings, sights)
+    if not readings.any():
+        return False
     pose = np.ascontiguousarray(view.X_WC[:3] / parameters.resolution, np.float64)
     box = np.empty((2, 3), np.int64)
     extent(stride, camera, pose, readings, sights, box)
@@ -124,3 +127,4 @@ def _integrate_view(
         if apply(empty.tile(key) if old is None else old, stamps[there], new):
             new.flags.writeable = False
             tiles[key] = new
+    return True

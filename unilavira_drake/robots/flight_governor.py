@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from unilavira_drake.kernels import frozen_view
-from unilavira_drake.messages import VoxelMap
+from unilavira_drake.messages import Awaited, VoxelMap
 from unilavira_drake.messages.voxels import TILE, tiles_between
 from unilavira_drake.ports import message_input, pose_input, vector_input
 from unilavira_drake.robots.flight_limits import FlightLimits
@@ -26,6 +26,8 @@ from unilavira_drake.robots.stopping import stoppable_speed
 
 LEASH = 1.5
 """The setpoint is never farther from the aircraft than this, metres."""
+MOVING = 0.05
+"""An aircraft that measures a higher speed must see its pose change, m/s."""
 
 
 class FlightGovernor(LeafSystem):
@@ -34,13 +36,18 @@ class FlightGovernor(LeafSystem):
     * The setpoint moves after the desired one within the limits of speed, acceleration and yaw
       rate, and never leaves the fence; an aircraft that is outside may come back.
     * A desired setpoint that is not finite, or older than ``command_timeout``, and a map older
-      than ``map_timeout``, end in hovering: the setpoint brakes and stays.  So does whatever
-      takes long to answer: without a path the setpoint rests, however late a reply may be.
+      than ``map_timeout``, end in hovering: the setpoint brakes and stays.  So does any while a
+      model's reply is awaited for longer than ``reply_timeout``.
+    * An aircraft that does not know how it moves (a twist that is not finite, or a pose that stays
+      the same for ``pose_timeout`` though the twist says otherwise) slows down, and the setpoint
+      comes back to where it was seen last.
     * The setpoint moves only so fast that it still stops, after v^2 / 2a and one period, before
-      the aircraft around it meets an occupied voxel.
+      the aircraft around it meets an occupied voxel.  Unknown space counts as free: no camera
+      looks up, so a climb is checked only against what was mapped before.
     * The aircraft may always turn on the spot.
 
-    The state is the setpoint.  It is NaN until pose and command are known, and finite ever after.
+    The state is the setpoint, NaN until pose and command are known and finite ever after, and when
+    the pose last changed.
 
     .. pydrake_system::
 
@@ -50,6 +57,8 @@ class FlightGovernor(LeafSystem):
         - map
         - pose_estimate
         - twist
+        - language_awaited (optional)
+        - vision_awaited (optional)
         output_ports:
         - base_command
 
@@ -63,6 +72,8 @@ class FlightGovernor(LeafSystem):
         standoff: that stays free before the aircraft, for what it lags and wavers, metres.
         command_timeout: seconds.
         map_timeout: seconds; longer than a mapper's period at rest.
+        reply_timeout: seconds.
+        pose_timeout: for which a moving aircraft's pose may stay the same, seconds.
     """
 
     def __init__(
@@ -75,6 +86,8 @@ class FlightGovernor(LeafSystem):
         standoff: float = 0.1,
         command_timeout: float = 0.3,
         map_timeout: float = 3.0,
+        reply_timeout: float = 150.0,
+        pose_timeout: float = 0.3,
     ) -> None:
         super().__init__()
         warm_up()
@@ -84,41 +97,79 @@ class FlightGovernor(LeafSystem):
         self._standoff = standoff
         self._command_timeout = command_timeout
         self._map_timeout = map_timeout
+        self._reply_timeout = reply_timeout
+        self._pose_timeout = max(pose_timeout, 1.5 * limits.period)
         self._desired = vector_input(self, "desired_command", 8)
         self._map = message_input(self, "map", VoxelMap())
         self._pose = pose_input(self, "pose_estimate")
-        # The ports of a governor are the same on the ground and in the air.
-        vector_input(self, "twist", 6)
+        self._twist = vector_input(self, "twist", 6)
+        self._awaited = tuple(
+            message_input(self, f"{role}_awaited", Awaited()) for role in ("language", "vision")
+        )
         unknown: Any = np.full(7, np.nan)
         index = self.DeclareDiscreteState(unknown)
         self._setpoint_index = int(index)
+        # The pose (3 x 4) that was seen last, and the time at which it was new.
+        unseen: Any = np.full(13, -np.inf)
+        self._seen_index = int(self.DeclareDiscreteState(unseen))
         self.DeclareStateOutputPort("base_command", index)
         self.DeclarePeriodicDiscreteUpdateEvent(limits.period, offset, self._update)
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         desired: Any = self._desired(context)
         old: Any = context.get_discrete_state(self._setpoint_index).value()
-        fresh = abs(context.get_time() - desired[7]) <= self._command_timeout
-        valid = bool(fresh and np.isfinite(desired).all())
-        p_WB = self._pose(context).translation()
+        valid = self._obeyed(context, desired)
+        X_WB = self._pose(context).GetAsMatrix34()
+        p_WB = X_WB[:, 3]
+        seen = bool(np.isfinite(p_WB).all())
+        lost = self._lost(context, discrete_state, X_WB)
         if math.isnan(old[0]):
-            if not (valid and np.isfinite(p_WB).all()):
+            if not (valid and seen):
                 return
             old = np.array([*p_WB, desired[3], 0.0, 0.0, 0.0])
-        elif valid and np.array_equal(old, desired[:7]) and not old[4:].any():
+        elif valid and not lost and np.array_equal(old, desired[:7]) and not old[4:].any():
             return
         setpoint = np.array(old)
-        if np.isfinite(p_WB).all():
+        if seen:
             behind = setpoint[:3] - p_WB
             distance = math.sqrt(float(behind @ behind))
-            if distance > LEASH:
-                setpoint[:3] = p_WB + behind * (LEASH / distance)
-        v = self._velocity(context, setpoint, np.array(desired[:7]) if valid else None)
+            back = self._limits.max_speed * self._limits.period
+            leash = max(distance - back, 0.0) if lost else LEASH
+            if distance > leash:
+                setpoint[:3] = p_WB + behind * (min(leash, LEASH) / distance)
+        followed = valid and not lost
+        v = self._velocity(context, setpoint, np.array(desired[:7]) if followed else None)
         setpoint[4:] = v
         setpoint[:3] += self._limits.period * v
         if valid:
             setpoint[3] = next_yaw(setpoint[3], float(desired[3]), self._limits)
         discrete_state.set_value(self._setpoint_index, setpoint)  # type: ignore[arg-type]
+
+    def _obeyed(self, context: Context, desired: NDArray[np.float64]) -> bool:
+        """Whether a command is finite and fresh, and no reply is overdue."""
+        time = context.get_time()
+        if not (abs(time - desired[7]) <= self._command_timeout and np.isfinite(desired).all()):
+            return False
+        for reader in self._awaited:
+            awaited = reader.optional(context)
+            since = None if awaited is None else awaited.since
+            if since is not None and time - since > self._reply_timeout:
+                return False
+        return True
+
+    def _lost(
+        self, context: Context, discrete_state: DiscreteValues, X_WB: NDArray[np.float64]
+    ) -> bool:
+        """Whether nobody knows how the aircraft moves."""
+        time = context.get_time()
+        twist: Any = self._twist(context)
+        speed = math.sqrt(float(twist[3:] @ twist[3:])) if np.isfinite(twist).all() else math.nan
+        seen: Any = context.get_discrete_state(self._seen_index).value()
+        if not np.array_equal(seen[:12], X_WB.ravel()):
+            now: Any = np.array([*X_WB.ravel(), time])
+            discrete_state.set_value(self._seen_index, now)
+            return not (math.isfinite(speed) and bool(np.isfinite(X_WB).all()))
+        return math.isnan(speed) or (speed > MOVING and time - float(seen[12]) > self._pose_timeout)
 
     def _velocity(
         self, context: Context, setpoint: NDArray[np.float64], desired: NDArray[np.float64] | None
