@@ -158,7 +158,7 @@ def make_navigation_diagram(
         ),
     )
     _close_the_ring(wiring, scenario.robot.views)
-    if scenario.recalibration_period is not None or "recalibration" in own:
+    if scenario.recalibration_period or "recalibration" in own:
         period = scenario.recalibration_period or math.inf
         wiring.add("recalibration", lambda: Recalibration(period=period))
         wiring.connect_wanted("recalibration", "recalibrations", "station")

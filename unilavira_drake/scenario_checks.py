@@ -84,6 +84,7 @@ _RULES: dict[str, _Rule] = {
     "pose_estimate.yaw_noise_degrees": _NOT_NEGATIVE,
     "pose_estimate.position_drift": _NOT_NEGATIVE,
     "pose_estimate.yaw_drift_degrees": _NOT_NEGATIVE,
+    "recalibration_period": _NOT_NEGATIVE,
     "exposure.target": ("0.01 to 1", lambda v: 0.01 <= v <= 1),
     "flight.wind.speed": _NOT_NEGATIVE,
     "flight.wind.direction_degrees": ("-360 to 360 degrees", lambda v: abs(v) <= 360),

@@ -32,7 +32,7 @@ def errors(period: str, times: list[float]) -> list[float]:
 
 
 def test_a_recalibration_ends_the_drift() -> None:
-    free = errors("null", [11.9, 12.2])
+    free = errors("0", [11.9, 12.2])
     ended = errors("12", [11.9, 12.2])
     assert free[0] == ended[0] > 0.005
     assert free[1] > 0.5 * free[0]

@@ -119,7 +119,7 @@ class FlightGovernor(LeafSystem):
         desired: Any = self._desired(context)
         old: Any = context.get_discrete_state(self._setpoint_index).value()
         valid = self._obeyed(context, desired)
-        X_WB = self._pose(context).GetAsMatrix34()
+        X_WB: Any = self._pose(context).GetAsMatrix34()
         p_WB = X_WB[:, 3]
         seen = bool(np.isfinite(p_WB).all())
         lost = self._lost(context, discrete_state, X_WB)
