@@ -69,6 +69,14 @@ def test_unconnected_port_is_named() -> None:
         Simulator(Listener()).AdvanceTo(0.1)
 
 
+def test_an_optional_port_is_absent_where_nothing_feeds_it() -> None:
+    listener = Listener()
+    fed, unfed = listener.CreateDefaultContext(), listener.CreateDefaultContext()
+    listener.GetInputPort("goal").FixValue(fed, Goal(n=3))
+    values = [listener.goal.optional(context) for context in (unfed, fed, unfed, fed)]
+    assert values == [None, Goal(n=3), None, Goal(n=3)]
+
+
 def test_termination_of_a_level_ends_the_simulation() -> None:
     listener = Listener()
     context = listener.CreateDefaultContext()

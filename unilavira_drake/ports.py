@@ -36,15 +36,12 @@ class InputReader(Generic[T]):
         self._type = type_
         self._name = name
         self._port = system.DeclareAbstractInputPort(name, model)
+        self._once_fed = False
 
     @property
     def ticket(self) -> Any:
         """Dependency ticket of the port."""
         return self._system.input_port_ticket(self._port.get_index())
-
-    def connected(self, context: Context) -> bool:
-        """Whether anything feeds the port (an unconnected optional port is an absent part)."""
-        return bool(self._port.HasValue(context))
 
     def __call__(self, context: Context) -> T:
         """Returns the value on the port.
@@ -71,8 +68,18 @@ class InputReader(Generic[T]):
 
     def optional(self, context: Context) -> T | None:
         """Returns the value on the port, or None when nothing is connected."""
-        # Asked first: an exception on a port that is left free costs a hundred times as much.
-        return self(context) if self._port.HasValue(context) else None
+        # HasValue costs as much as Eval, and an exception on a port that is left free a hundred
+        # times as much: what was fed once is read without asking.
+        if not self._once_fed:
+            if not self._port.HasValue(context):
+                return None
+            self._once_fed = True
+        try:
+            return self(context)
+        except PortTypeError:
+            if self._port.HasValue(context):
+                raise
+            return None
 
 
 def message_input(system: LeafSystem, name: str, default: T) -> InputReader[T]:
