@@ -148,9 +148,7 @@ class FlightGovernor(LeafSystem):
                 return False
         return True
 
-    def _lost(
-        self, context: Context, discrete_state: DiscreteValues, X_WB: NDArray[np.float64]
-    ) -> bool:
+    def _lost(self, context: Context, discrete_state: DiscreteValues, X_WB: Any) -> bool:
         """Whether nobody knows how the aircraft moves."""
         time = context.get_time()
         twist: Any = self._twist(context)
