@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from unilavira_drake.messages import Message
 
-_NUMBER = r"(\d+(?:\.\d+)?)"
-_DISTANCE = re.compile(rf"\b{_NUMBER} ?(?:m|meters?|metres?)\b")
+_NUMBER = r"(\d{1,3}(?:,\d{3})+(?:\.\d+)?|\d+(?:\.\d+)?)"
+_DISTANCE = re.compile(rf"(?<![\d.,]){_NUMBER} ?(?:m|meters?|metres?)\b")
 _ANGLE = re.compile(
     rf"(-?){_NUMBER} ?(?:degrees?|deg|°)(?: (?:to|on|from|at) (?:the|your|you))?(?: (left|right))?"
 )
@@ -26,6 +26,7 @@ _PLAIN = {
 _A_LITTLE = re.compile(r"\b(?:a little|slightly) to (?:your|the) (?:left|right)\b")
 SLIGHT = 12.0
 """What ``a little to your left`` means, degrees."""
+_CLAUSE = re.compile(r", | and | but | then ")
 _STATES = re.compile(r"\b(?:is|lies|located|stands|away|waits)\b")
 
 
@@ -43,21 +44,48 @@ def stated_direction(task: str) -> StatedDirection | None:
     """Returns the place that a task states by distance and angle, or None where it states none.
 
     An angle without a side counts to the right, as OpenUAV's yaw does.  An order (``fly 40 m
-    ahead``) states no place.
+    ahead``) states no place.  Of several distances that counts which stands nearest to the bearing,
+    in its own clause if there is one.
     """
     for sentence in re.split(r"(?<=[.;!?])\s+", task.lower()):
-        distance = _DISTANCE.search(sentence)
         bearing = _bearing(sentence)
-        if distance is not None and bearing is not None and _STATES.search(sentence):
-            return StatedDirection(float(distance.group(1)), bearing)
+        if bearing is None or not _STATES.search(sentence):
+            continue
+        degrees, where = bearing
+        distance = _nearest(sentence, where)
+        if distance is not None:
+            return StatedDirection(distance, degrees)
     return None
 
 
-def _bearing(sentence: str) -> float | None:
+def _nearest(sentence: str, where: int) -> float | None:
+    """Returns the distance that stands nearest to a place of a sentence, metres."""
+    clauses = [0, *(match.end() for match in _CLAUSE.finditer(sentence)), len(sentence)]
+
+    def away(match: re.Match[str]) -> tuple[bool, int]:
+        low, high = sorted((match.start(), where))
+        # A comma before the bearing does not part it from its own distance: "80 m away, ahead".
+        stated = any(
+            start <= match.start() < end and _STATES.search(sentence, start, end)
+            for start, end in zip(clauses, clauses[1:], strict=False)
+        )
+        return not stated, high - low
+
+    nearest = min(_DISTANCE.finditer(sentence), key=away, default=None)
+    return None if nearest is None else float(nearest.group(1).replace(",", ""))
+
+
+def _bearing(sentence: str) -> tuple[float, int] | None:
+    """Returns degrees to the left, and where in the sentence they stand."""
     angle = _ANGLE.search(sentence)
     if angle is not None:
         sign = 1.0 if angle.group(3) == "left" else -1.0
-        return (-sign if angle.group(1) else sign) * float(angle.group(2))
-    if _A_LITTLE.search(sentence) and "ahead" in sentence:
-        return SLIGHT if "left" in sentence else -SLIGHT
-    return next((value for words, value in _PLAIN.items() if words in sentence), None)
+        degrees = float(angle.group(2).replace(",", ""))
+        return (-sign if angle.group(1) else sign) * degrees, angle.start()
+    little = _A_LITTLE.search(sentence)
+    if little is not None and "ahead" in sentence:
+        return (SLIGHT if "left" in little.group() else -SLIGHT), sentence.index("ahead")
+    return next(
+        ((value, sentence.index(words)) for words, value in _PLAIN.items() if words in sentence),
+        None,
+    )
