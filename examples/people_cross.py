@@ -30,6 +30,7 @@ if __name__ == "__main__":
             intrinsics=front_intrinsics(scenario.robot),
             mapping=mapping_among(people, scenario.mapping),
             planning=planning_among(people, scenario.planning),
+            flight=scenario.flight,
             tick=scenario.tick,
             time_step=scenario.plant.time_step,
             moving_labels=detected_labels(world, people),

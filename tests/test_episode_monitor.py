@@ -303,7 +303,9 @@ def test_people_are_measured_by_the_least_gap_and_the_onsets_of_touches():
     assert bench.metrics.collisions == 0
 
 
-@pytest.mark.parametrize("people", [None, PeopleTruth()])
+@pytest.mark.parametrize(
+    "people", [None, PeopleTruth(), PeopleTruth((PersonTruth("person_1", gap=math.inf),))]
+)
 def test_where_nobody_walks_nothing_is_said_of_people(people):
     bench = Bench()
     if people is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 from pydrake.common.value import AbstractValue
@@ -23,6 +24,8 @@ from unilavira_drake.people.crowd import detected_labels, make_crowd, with_peopl
 from unilavira_drake.people.tracker import PeopleTracker
 from unilavira_drake.recording.recorder import Recorder
 from unilavira_drake.robots.quadrotor import Quadrotor
+from unilavira_drake.robots.recalibration import Recalibration
+from unilavira_drake.robots.robot import GroundRobot
 from unilavira_drake.scenario import Scenario, plant_config
 from unilavira_drake.sensors.detections import GroundTruthDetector
 from unilavira_drake.sensors.free_distance import axial_distance, free_distance, warm_up
@@ -67,6 +70,8 @@ def make_navigation_diagram(
         PortTypeError: if a replaced level lacks a port.
     """
     own = dict(replace or {})
+    if "locomotion" in own and not isinstance(scenario.robot, GroundRobot):
+        raise ScenarioError("replace: 'locomotion' moves bodies on the ground; leave it out.")
     warm_up()  # The agent takes this function from us; no System of its own compiles it.
     grounder = has_grounder(scenario.grounder, own)
     models = models or make_models(scenario)
@@ -74,7 +79,10 @@ def make_navigation_diagram(
         load_world(scenario.world.name, mirror=scenario.world.mirror), scenario.people
     )
     task = choose_task(scenario)
-    x, y, height, yaw = parse_start_pose(task.start, world, radius=scenario.robot.turning_radius)
+    robot = scenario.robot
+    x, y, height, yaw = parse_start_pose(
+        task.start, world, radius=robot.turning_radius, climbs=robot.leaves_the_ground
+    )
     intrinsics = front_intrinsics(scenario.robot)
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))
@@ -150,6 +158,10 @@ def make_navigation_diagram(
         ),
     )
     _close_the_ring(wiring, scenario.robot.views)
+    if scenario.recalibration_period or "recalibration" in own:
+        period = scenario.recalibration_period or math.inf
+        wiring.add("recalibration", lambda: Recalibration(period=period))
+        wiring.connect_wanted("recalibration", "recalibrations", "station")
     if scenario.people.count:
         wiring.connect("station", "cheat_people", "episode_monitor")
     if detected_labels(world, scenario.people):
@@ -168,7 +180,7 @@ def make_navigation_diagram(
         )
         _listen(wiring, todo=scenario.ablation in ("full", "no_scb"), grounder=grounder)
     if own:
-        levels = (*_TOP_LEVELS, *_PEOPLE_LEVELS, "locomotion", *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
+        levels = (*_TOP_LEVELS, *_OPTIONAL_LEVELS, *_AGENT_LEVELS, *_NAVIGATION_LEVELS)
         raise ScenarioError(unknown_name("level", next(iter(own)), levels, "replace"))
     return wiring.build("unilavira")
 
@@ -186,7 +198,7 @@ def _free_distance(scenario: Scenario) -> Callable[[Frame], float]:
     )
 
 
-_PEOPLE_LEVELS = ("people_tracker",)
+_OPTIONAL_LEVELS = ("people_tracker", "recalibration", "locomotion")
 _TOP_LEVELS = ("task", "station", "observer", "agent", "navigation", "episode_monitor", "recorder")
 _AGENT_LEVELS = (
     "language",

@@ -221,12 +221,12 @@ class EpisodeMonitor(Level):
         if people is None or people.gap is None:
             return state
         least, touched = state.metrics.min_person_distance, people.touched
-        nearest = people.gap if least is None else min(least, people.gap)
-        if nearest == least and touched == state.on_person:
+        nearest = min(math.inf if least is None else least, people.gap)
+        if nearest == (math.inf if least is None else least) and touched == state.on_person:
             return state
         metrics = dataclasses.replace(
             state.metrics,
-            min_person_distance=nearest,
+            min_person_distance=None if math.isinf(nearest) else nearest,
             person_contacts=state.metrics.person_contacts + int(touched and not state.on_person),
         )
         return dataclasses.replace(state, metrics=metrics, on_person=touched)

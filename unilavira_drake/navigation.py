@@ -30,14 +30,15 @@ def make_navigation(
     intrinsics: Intrinsics,
     mapping: MappingConfig,
     planning: PlanningConfig,
-    flight: FlightConfig,
     tick: float,
     time_step: float,
+    flight: FlightConfig | None = None,
     replace: MutableMapping[str, System] | None = None,
     moving_labels: Sequence[int] = (),
 ) -> Diagram:
     """Returns the deterministic half of Robot Action (paper III-B.3); the robot's type chooses.
 
+    ``mapping`` and ``planning`` are for the ground, ``flight`` (by default for rooms) for the air.
     With ``moving_labels``, render labels of what moves, it has the input ``front.label_image``.
 
     Raises:
@@ -51,7 +52,7 @@ def make_navigation(
         return make_flight_navigation(
             robot=robot,
             intrinsics=intrinsics,
-            flight=flight,
+            flight=flight or FlightConfig(),
             tick=tick,
             time_step=time_step,
             replace=replace,

@@ -111,6 +111,11 @@ class VectorReader:
         self._size = size
         self._port = system.DeclareVectorInputPort(name, BasicVector(size))
 
+    @property
+    def ticket(self) -> Any:
+        """Dependency ticket of the port."""
+        return self._system.input_port_ticket(self._port.get_index())
+
     def __call__(self, context: Context) -> NDArray[np.float64]:
         """Returns the (size,) float64 vector on the port.
 

@@ -124,6 +124,9 @@ class Scenario:
     world: WorldChoice = dc.field(default_factory=WorldChoice)
     robot: RobotChoice = dc.field(default_factory=CobotMagic)
     pose_estimate: PoseEstimateConfig = dc.field(default_factory=PoseEstimateConfig)
+    # Seconds between two recalibrations: they end the drift of the pose, lock the exposure anew;
+    # 0: there are none.
+    recalibration_period: float = 0.0
     exposure: ExposureConfig = dc.field(default_factory=ExposureConfig)
     # Where the robot starts unless the task says otherwise: ROOM or X,Y,YAW.
     start: str = ""

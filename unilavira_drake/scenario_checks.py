@@ -25,6 +25,7 @@ from unilavira_drake.mllm.latency import (
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
 from unilavira_drake.people.crowd import make_crowd, with_people
 from unilavira_drake.robots.flight_config import FlightConfig
+from unilavira_drake.robots.robot import GroundRobot
 from unilavira_drake.scenario import (
     ABLATIONS,
     GROUNDERS,
@@ -84,6 +85,7 @@ _RULES: dict[str, _Rule] = {
     "pose_estimate.yaw_noise_degrees": _NOT_NEGATIVE,
     "pose_estimate.position_drift": _NOT_NEGATIVE,
     "pose_estimate.yaw_drift_degrees": _NOT_NEGATIVE,
+    "recalibration_period": _NOT_NEGATIVE,
     "exposure.target": ("0.01 to 1", lambda v: 0.01 <= v <= 1),
     "flight.wind.speed": _NOT_NEGATIVE,
     "flight.wind.direction_degrees": ("-360 to 360 degrees", lambda v: abs(v) <= 360),
@@ -227,6 +229,11 @@ def _check_order(scenario: Scenario) -> None:
 
 def _check_people(scenario: Scenario, world: World, robot: tuple[float, float]) -> None:
     people = scenario.people
+    if people.count and not isinstance(scenario.robot, GroundRobot):
+        raise ScenarioError(
+            f"people.count: {people.count} people, but only robots on the ground know of people; "
+            "set it to 0, or choose such a robot."
+        )
     for low, high in (("min_speed", "max_speed"), ("min_pause", "max_pause")):
         if getattr(people, low) > getattr(people, high):
             raise ScenarioError(

@@ -116,7 +116,10 @@ def make_navigation_station(
         world = load_world(scenario.world.name, mirror=scenario.world.mirror)
     if start is None:
         x, y, start_height, yaw = parse_start_pose(
-            choose_task(scenario).start, world, radius=scenario.robot.turning_radius
+            choose_task(scenario).start,
+            world,
+            radius=scenario.robot.turning_radius,
+            climbs=scenario.robot.leaves_the_ground,
         )
         start = (x, y, yaw)
     builder = DiagramBuilder()
@@ -196,8 +199,7 @@ def _add_robot(plant: MultibodyPlant, robot: Robot) -> ModelInstanceIndex:
     if not path.is_file():
         raise ScenarioError(f"robot.model: no file {model!r}; check the path.")
     if robot.can_climb:
-        text = climbing_model(path.read_text(encoding="utf-8"))
-        (model_instance,) = parser.AddModelsFromString(text, "sdf")
+        (model_instance,) = parser.AddModelsFromString(climbing_model(path), "sdf")
     else:
         (model_instance,) = parser.AddModelsFromUrl(model) if known else parser.AddModels(path)
     return model_instance

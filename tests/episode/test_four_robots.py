@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import hashlib
 from typing import Any
@@ -23,7 +24,7 @@ from unilavira_drake.messages import (
     TodoItem,
     TodoList,
 )
-from unilavira_drake.mllm.prompt import compose_prompt
+from unilavira_drake.mllm.prompt import _environment, compose_prompt
 from unilavira_drake.resources import prompts_path
 from unilavira_drake.scenario_loading import robot_setting
 from unilavira_drake.tasks import TaskSpec
@@ -48,8 +49,13 @@ def told(value: Any) -> Any:
         return value.func.__name__, value.keywords
     if type(value) is tuple:
         return tuple(told(one) for one in value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = dataclasses.fields(value)
+        return type(value), tuple(told(getattr(value, field.name)) for field in fields)
     if isinstance(value, bool | int | float | str | tuple | type(None)):
         return value
+    if isinstance(value, np.ndarray):
+        return value.tolist()
     return type(value).__name__
 
 
@@ -57,10 +63,14 @@ def configuration(system: LeafSystem) -> dict[str, Any]:
     return {name: told(value) for name, value in vars(system).items()}
 
 
-def template_hashes() -> dict[str, str]:
+def templates_read(robot: str) -> dict[str, str]:
+    """Hashes of the template files that a robot's language and vision levels really read."""
+    _environment.cache_clear()
+    for name in ("language", "vision"):
+        asked(robot, name)
+    loaded = [name for _, name in list(_environment().cache)]
     return {
-        str(path.relative_to(prompts_path())): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(prompts_path().rglob("*.j2"))
+        name: hashlib.sha256((prompts_path() / name).read_bytes()).hexdigest() for name in loaded
     }
 
 
@@ -73,12 +83,21 @@ def test_the_levels_of_the_agent_are_of_one_class_and_configuration(robot: str, 
     assert len(configuration(mine)) > 1
 
 
-def test_all_robots_read_the_same_templates() -> None:
-    before = template_hashes()
-    for robot in GROUND:
-        diagram(robot)
-    assert template_hashes() == before
-    assert len(before) >= 15
+@pytest.mark.parametrize("name", ["language", "vision"])
+def test_an_aircraft_has_the_same_language_and_vision(name: str) -> None:
+    mine, first = configuration(level("quadrotor", name)), configuration(level("cobot_magic", name))
+    assert type(level("quadrotor", name)) is type(level("cobot_magic", name))
+    # How far a view is free is measured by the body: over a floor, or along an axis in the air.
+    for measured in (mine, first):
+        measured.pop("_free_distance", None)
+    assert mine == first
+
+
+@pytest.mark.parametrize("robot", [*GROUND[1:], "quadrotor"])
+def test_all_robots_read_the_same_templates(robot: str) -> None:
+    first = templates_read("cobot_magic")
+    assert templates_read(robot) == first
+    assert {"language/decide.txt.j2", "vision/ground.txt.j2", "tasks/vln.txt.j2"} <= set(first)
 
 
 def panorama() -> Panorama:

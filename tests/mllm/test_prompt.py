@@ -105,20 +105,6 @@ RECOVER = _with(
     failed_direction="right",
     failed_pictures=("H1", "H2"),
 )
-# With nobody in the left view.
-PEOPLE = {
-    "front": (
-        "person in red, 1.4 m, 12 degrees to the left, walking towards you",
-        "person in blue, 3.0 m, standing, seen 4 s ago",
-    ),
-    "back": ("person in green, 0.9 m",),
-}
-AMONG_PEOPLE = {
-    "people": True,
-    "views": tuple(
-        dataclasses.replace(view, people=PEOPLE.get(view.direction, ())) for view in VARIABLES.views
-    ),
-}
 BARE = {"todo": None, "todo_feedback": (), "second_chance": False}
 GOLDENS = {
     "plan_todo": FIRST,
@@ -127,9 +113,7 @@ GOLDENS = {
     "decide_no_scb": _with(DECIDE, second_chance=False),
     "decide_no_both": _with(DECIDE, **BARE),
     "decide_again": dataclasses.replace(DECIDE, attempt=1, feedback="The key scene is missing."),
-    "decide_people": _with(DECIDE, **AMONG_PEOPLE),
     "recover": RECOVER,
-    "recover_people": _with(RECOVER, **AMONG_PEOPLE),
     "recover_no_tdm": _with(RECOVER, todo=None, todo_feedback=()),
     "double_check": _with(dataclasses.replace(DECIDE, call="double_check"), family="objectnav"),
     "double_check_no_tdm": _with(

@@ -50,6 +50,7 @@ class Drive:
                 intrinsics=front_intrinsics(scenario.robot),
                 mapping=mapping_among(scenario.people, scenario.mapping),
                 planning=planning_among(scenario.people, scenario.planning),
+                flight=scenario.flight,
                 tick=scenario.tick,
                 time_step=scenario.plant.time_step,
                 moving_labels=labels,

@@ -114,6 +114,24 @@ def test_what_is_wrong_is_said(config, words):
         crowd(config)
 
 
+def test_a_waypoint_upstairs_is_refused():
+    house = load_world("two_storey")
+    route = WalkRoute(waypoints=["hall", "library"])
+    with pytest.raises(ScenarioError, match=r"library.* 2\.8 m.*study") as error:
+        crowd(PeopleConfig(count=1, routes=[route]), house)
+    assert "people.routes.0.waypoints" in str(error.value)
+    assert "bathroom" not in str(error.value)
+
+
+def test_drawn_walks_lead_from_room_to_room_of_the_ground_floor_alone():
+    house = load_world("two_storey")
+    ground = tuple(room for room in house.rooms if room.elevation == 0.0)
+    alone = dataclasses.replace(house, rooms=ground)
+    config = PeopleConfig(count=4)
+    for seed in range(3):
+        assert crowd(config, house, seed) == crowd(config, alone, seed)
+
+
 def test_a_figure_stands_on_the_floor_and_is_as_tall_as_it_says():
     (person,) = crowd(PeopleConfig(count=1))
     z = [ring[0] for part in figure(person) if part.limb == "body" for ring in part.rings]

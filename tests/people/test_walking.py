@@ -147,6 +147,14 @@ def test_who_is_within_that_may_leave_but_not_go_farther_in():
     assert wishes[1] == pytest.approx(0.0)
 
 
+@pytest.mark.parametrize(("z", "waits"), [(0.0, True), (1.5, True), (2.8, False), (-2.8, False)])
+def test_a_robot_on_another_storey_holds_nobody(z, waits):
+    walk = Walk()
+    robot = (1.0, 0.0, 0.0, 0.3, 0.3, 0.0, 0.0, z)
+    x, _, _ = walk.go(2.0, robot=robot)
+    assert (x < 1.0) == waits
+
+
 def test_impolite_people_keep_walking():
     walk = Walk(manners=Manners(polite=False))
     assert walk.go(3.0, robot=(1.0, 0.0))[0] > 2.5

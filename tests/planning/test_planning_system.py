@@ -250,6 +250,25 @@ def test_a_way_that_gets_closed_fails():
     assert bench.wait() == NavigationStatus(1, "failed", "unreachable")
 
 
+def test_each_of_two_blockages_in_the_final_stretch_is_waited_for():
+    bench = Bench(patience=2.0, stuck_time=60.0, radius=0.2, turning_radius=0.25, snap_distance=0.3)
+    bench.give("goal", go())
+    bench.wait()
+    while math.dist(bench.position, (6.0, 2.0)) > 0.7:
+        bench.drive(0.5)
+    person = {"wall": (5.6, 0.0, 5.65, 4.0)}
+    for version in (2, 4):
+        bench.give("map", room(version=version, **person))
+        assert bench.wait(15).state == "moving"
+        bench.give("map", room(version=version + 1))
+        assert bench.wait(15).state == "moving"
+    # Who stays longer than the patience is not waited for.
+    bench.give("map", room(version=6, **person))
+    bench.wait(21)
+    bench.give("map", room(version=7, **person))
+    assert bench.wait().state != "moving"
+
+
 def test_an_idle_poll_changes_nothing():
     bench = Bench()
     bench.give("goal", go())

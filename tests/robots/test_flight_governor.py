@@ -13,7 +13,7 @@ from unilavira_drake.messages import VoxelMap
 from unilavira_drake.messages.voxels import TILE
 from unilavira_drake.robots.flight_governor import LEASH, FlightGovernor
 from unilavira_drake.robots.flight_limits import FlightLimits
-from unilavira_drake.robots.flight_stopping import free_flight
+from unilavira_drake.robots.flight_stopping import free_flight, voxels_ahead
 
 LIMITS = FlightLimits()
 NO_FENCE = np.array([[-np.inf] * 3, [np.inf] * 3])
@@ -215,7 +215,10 @@ def test_the_free_way_is_that_of_a_ball_marched_in_small_steps(seed):
     direction = rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     radius = 0.12
-    found = free_flight(window, np.zeros(3, np.int64), 0.1, p, direction, 1.0, radius)
+    bounds = voxels_ahead(p, direction, 1.0, radius + 0.1, 0.1)
+    found = free_flight(window, (0, 0, 0), bounds, 0.1, p, direction, 1.0, radius)
+    nowhere = np.array([3, 3, 3, 3, 3, 3])
+    assert free_flight(window, (0, 0, 0), nowhere, 0.1, p, direction, 1.0, radius) == 1.0
     centers = (np.argwhere(window > 0) + 0.5) * 0.1
     reach = radius + 0.05
     steps = np.arange(0.0, 1.0, 0.002)

@@ -2,8 +2,12 @@
 
 import numpy as np
 import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
 
+from unilavira_drake.errors import ScenarioError
 from unilavira_drake.resources import models_path
 from unilavira_drake.robots.cobot_magic import CobotMagic
 from unilavira_drake.robots.terrain import GRAVITY, STIFFNESS, TerrainFollower, climbing_model
@@ -18,12 +22,46 @@ STAIRS = HOUSE.stairs[0]
 
 
 def test_a_height_joint_between_the_planar_base_and_the_body() -> None:
-    text = (models_path() / "robots" / "cobot_magic.sdf").read_text(encoding="utf-8")
-    model = climbing_model(text)
+    model = climbing_model(models_path() / "robots" / "cobot_magic.sdf")
     assert model.count("base_height") == 1
     assert model.count('name="lift"') == 1
-    with pytest.raises(ValueError, match="base_yaw"):
-        climbing_model("<sdf><model name='bare'/></sdf>")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("bare.sdf", "<sdf><model name='bare'/></sdf>", "base_yaw"),
+        ("cart.urdf", "<robot name='cart'><joint name='base_yaw'/></robot>", "SDF"),
+        ("torn.sdf", "<sdf>", "no SDF"),
+    ],
+)
+def test_a_model_that_cannot_climb_is_named(tmp_path, name, text, words) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    scenario = Scenario(
+        world=WorldChoice("two_storey"), robot=UnitreeG1(model=str(path), can_climb=True)
+    )
+    with pytest.raises(ScenarioError, match=words) as error:
+        make_navigation_station(scenario, world=HOUSE, start=(6.0, 2.0, 0.0))
+    assert name in str(error.value)
+
+
+def test_meshes_beside_the_model_are_found(tmp_path) -> None:
+    text = (models_path() / "robots" / "unitree_g1.sdf").read_text(encoding="utf-8")
+    mesh = "<geometry><mesh><uri>meshes/lid.obj</uri></mesh></geometry>"
+    link = '<link name="base">'
+    assert text.count(link) == 1
+    visual = f'<visual name="lid">{mesh}</visual>'
+    path = tmp_path / "own_g1.sdf"
+    path.write_text(text.replace(link, link + visual))
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "lid.obj").write_text("v 0 0 1\nv 1 0 1\nv 0 1 1\nf 1 2 3\n")
+    plant, scene_graph = AddMultibodyPlantSceneGraph(DiagramBuilder(), 0.001)
+    parser = Parser(plant)
+    (instance,) = parser.AddModelsFromString(climbing_model(path), "sdf")
+    geometries = plant.GetVisualGeometriesForBody(plant.GetBodyByName("base", instance))
+    names = [scene_graph.model_inspector().GetName(geometry) for geometry in geometries]
+    assert any("lid" in name for name in names)
 
 
 def test_the_locomotion_sees_level_ground() -> None:

@@ -78,6 +78,22 @@ def test_a_recalibration_locks_the_exposure_anew():
     assert (bench.color("front") > before).all()
 
 
+def test_a_clone_that_is_given_to_another_simulator_keeps_the_gain():
+    bench = Bench("locked")
+    assert (bench.color("front") == (100, 80, 60)).all()
+    bench.simulator.AdvanceTo(0.5)
+    locked = bench.color("front")
+    bench.context = bench.context.Clone()
+    bench.show(picture(20, 20, 20), picture(20, 20, 20))
+    again = Simulator(bench.control, bench.context)
+    again.Initialize()
+    bench.context = again.get_mutable_context()
+    bench.show(picture(100, 80, 60), picture(100, 80, 60))
+    assert (bench.color("front") == locked).all()
+    again.AdvanceTo(1.0)
+    assert (bench.color("front") == locked).all()
+
+
 def test_the_station_renders_a_first_picture_only_to_lock():
     small = "robot: {image_width: 64, image_height: 48}"
     station = make_navigation_station(

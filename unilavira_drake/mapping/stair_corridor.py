@@ -31,6 +31,10 @@ KNOWN_AFTER = 0.8
 """The robot's way tells the slope after so much of it, metres."""
 STEP = 0.4
 """What stands less high over the slope is a step, metres."""
+RISEN = 2.0
+"""A storey is higher than this and a landing halfway lower, metres."""
+LEVEL_AGAIN = 0.3
+"""There the stairs are over after so much of level floor, metres."""
 TALLEST = 1.4
 """What is higher above the feet is passed under, metres."""
 
@@ -107,7 +111,7 @@ class StairCorridor(Message):
 
 
 def corridor_at(
-    goal: Goal, place: tuple[float, float, float], *, half_width: float
+    goal: Goal, place: tuple[float, float, float], *, half_width: float, level: float = 0.0
 ) -> StairCorridor | None:
     """Returns the corridor of a goal over stairs, or None where the robot is not on them.
 
@@ -115,6 +119,7 @@ def corridor_at(
         goal: ``climb`` or ``descend``.
         place: of the robot's feet, metres in the world.
         half_width: of the corridor, metres.
+        level: way on level floor that lies behind the robot, metres.
     """
     if goal.p_WG is None or goal.heading is None or not all(map(math.isfinite, place)):
         return None
@@ -123,9 +128,11 @@ def corridor_at(
     along, aside = c * dx + s * dy, c * dy - s * dx
     if along < -BEFORE or abs(aside) > ASIDE:
         return None
+    rise = place[2] - goal.p_WG[2]
+    if abs(rise) >= RISEN and level >= LEVEL_AGAIN:
+        return None
     slope = 0.0
     if goal.kind == "climb":
-        rise = place[2] - goal.p_WG[2]
         # Behind a landing it goes on as steeply as before.
         slope = max(USUAL_SLOPE, rise / along if along > KNOWN_AFTER else 0.0)
     return StairCorridor(place, goal.p_WG[:2], goal.heading, slope, half_width)

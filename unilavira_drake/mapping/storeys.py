@@ -50,6 +50,12 @@ class Storeys(Message):
         """The map of the storey where the robot is; an empty one before the first."""
         return self.known[self.current].occupancy if self.known else OccupancyMap()
 
+    def level_travel(self, place: tuple[float, float, float]) -> float:
+        """Returns how far the floor has been level up to a place of the feet, metres."""
+        if abs(place[2] - self.level_since[2]) > LEVEL:
+            return 0.0
+        return math.dist(place[:2], self.level_since[:2])
+
     def mapped(self, occupancy: OccupancyMap) -> Storeys:
         """Returns the storeys with another map where the robot is."""
         here = dc.replace(self.known[self.current], occupancy=occupancy)

@@ -192,7 +192,8 @@ class OccupancyMapper(Level):
             return None
         width = self._parameters.footprint_radius + SWAY
         place = (float(X_WB[0, 3]), float(X_WB[1, 3]), float(X_WB[2, 3]) - self._base_height)
-        return corridor_at(goal, place, half_width=width)
+        level = state.storeys.level_travel(place)
+        return corridor_at(goal, place, half_width=width, level=level)
 
     def _seen_moving(self, context: Context) -> NDArray[np.bool_]:
         if self._label_image is None:

@@ -18,7 +18,8 @@ class PersonTruth(Message):
     yaw: float = 0.0
     """Radians."""
     gap: float = math.inf
-    """Metres from the robot's footprint to the body; 0 when they touch or overlap."""
+    """Metres from the robot's footprint to the body; 0 when they touch or overlap,
+    inf while it is on another storey or above their heads."""
     touched: bool = False
     """Whether robot and person press on each other just now."""
 

@@ -17,6 +17,8 @@ from unilavira_drake.worlds.clearance import clearance, obstacles, room_grid
 from unilavira_drake.worlds.palette import PALETTE
 from unilavira_drake.worlds.world import LabelEntry, Room, World
 
+GROUND = 0.0
+"""Height of the floor of the storey on which all people walk, metres."""
 RADIUS = 0.25
 """Of a person with arms, metres."""
 CLEARANCE = 0.33
@@ -151,6 +153,7 @@ class _Floor:
 
     def __init__(self, world: World) -> None:
         self._world = world
+        self._rooms = tuple(room for room in world.rooms if room.elevation == GROUND)
         x_min, y_min = (min(room.rectangle[i] for room in world.rooms) for i in (0, 1))
         x_max, y_max = (max(room.rectangle[i] for room in world.rooms) for i in (2, 3))
         self._space: FreeSpace = rasterize(
@@ -178,7 +181,7 @@ class _Floor:
 
     def drawn(self, random: np.random.Generator, others: Sequence[Point]) -> tuple[Point, ...]:
         """Returns a walk between two places that are drawn, in two rooms where there are two."""
-        rooms = [room for room in self._world.rooms if len(self._free(room))]
+        rooms = [room for room in self._rooms if len(self._free(room))]
         for _ in range(_TRIES if rooms else 0):
             chosen = random.choice(len(rooms), size=2, replace=len(rooms) < 2)
             start, end = (self._draw(random, rooms[int(k)]) for k in chosen)
@@ -211,8 +214,14 @@ class _Floor:
         else:
             room = self._world.room(text) or self._world.room(text.replace("_", " "))
             if room is None:
-                names = {room.name for room in self._world.rooms}
+                names = {room.name for room in self._rooms}
                 raise ScenarioError(unknown_name("room", text, names, place))
+            if room.elevation != GROUND:
+                known = ", ".join(room.name for room in self._rooms)
+                raise ScenarioError(
+                    f"{place}: {text!r} has its floor at {room.elevation:g} m; people walk at "
+                    f"{GROUND:g} m alone: name one of {known}."
+                )
             points = room_grid(room, _GRID_STEP)
             x, y = points[int(np.argmax(clearance(self._world, points)))].tolist()
         if not self._space.is_free(x, y):

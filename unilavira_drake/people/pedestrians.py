@@ -167,7 +167,7 @@ class PeopleWatch(LeafSystem):
                     name=one.person.name,
                     position=(x, y),
                     yaw=math.atan2(s, c),
-                    gap=max(min(gaps) - THICKNESS, 0.0),
+                    gap=max(min(gaps) - THICKNESS, 0.0) if robot.within_reach else math.inf,
                     touched=int(one.body) in touched,
                 )
             )
@@ -177,7 +177,8 @@ class PeopleWatch(LeafSystem):
 def _seen(X_WB: RigidTransform, footprint: tuple[float, float]) -> RobotSeen:
     X = X_WB.GetAsMatrix34()
     yaw = math.atan2(X[1, 0], X[0, 0])
-    return RobotSeen(float(X[0, 3]), float(X[1, 3]), yaw, footprint[0] / 2.0, footprint[1] / 2.0)
+    x, y, z = (float(value) for value in X[:, 3])
+    return RobotSeen(x, y, yaw, footprint[0] / 2.0, footprint[1] / 2.0, z=z)
 
 
 def _touched(contacts: ContactResults) -> set[int]:

@@ -47,7 +47,7 @@ class PeopleTracker(Level):
     Args:
         clothes: colour word of each person's clothes, by render label.
         intrinsics: of all views.
-        views: names of the robot's cameras; those that look down are left out.
+        views: names of the robot's cameras.
         period: seconds between two looks.
     """
 

@@ -6,7 +6,7 @@ import dataclasses
 import math
 
 from unilavira_drake.messages import Message
-from unilavira_drake.people.crowd import RADIUS, Person
+from unilavira_drake.people.crowd import GROUND, RADIUS, Person
 
 ACCELERATION = 1.5
 """Metres a second squared."""
@@ -16,6 +16,8 @@ AHEAD = math.radians(60.0)
 """The robot is ahead of who walks within this angle of its direction."""
 FORESIGHT, FORESEEN = 0.25, 10
 """Polite people look so many steps of so many seconds ahead."""
+OUT_OF_REACH = 2.1
+"""A robot so far above or below their floor is on another storey or passes over heads, metres."""
 MARGIN = 0.25
 """What they want to keep between them and the robot, metres."""
 TURNING, TURNING_SOON = 0.10, 4
@@ -74,6 +76,13 @@ class RobotSeen(Message):
     vx: float = 0.0
     vy: float = 0.0
     """Metres a second, in the world."""
+    z: float = 0.0
+    """Of its base, metres in the world."""
+
+    @property
+    def within_reach(self) -> bool:
+        """Whether people can meet it: an upper storey's robots and high flights they cannot."""
+        return abs(self.z - GROUND) < OUT_OF_REACH
 
     def nearest(self, x: float, y: float, after: float = 0.0) -> tuple[float, float]:
         """Returns its point nearest to (x, y), relative to that, in so many seconds; metres."""
@@ -192,6 +201,8 @@ def _must_wait(
     robot: RobotSeen, x: float, y: float, bearing: float, speed: float, manners: Manners
 ) -> bool:
     """Whether the robot is near ahead, or would come too near if both went straight on."""
+    if not robot.within_reach:
+        return False
     dx, dy = robot.nearest(x, y)
     near = math.hypot(dx, dy)
     turn = abs(math.remainder(math.atan2(dy, dx) - bearing, 2.0 * math.pi))

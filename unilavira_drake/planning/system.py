@@ -71,7 +71,7 @@ class PlannerState(Message):
     travelled: float = 0.0
     budget: float = 0.0
     blocked_since: float = math.inf
-    """Since when there is no way any more, seconds; inf while there is one."""
+    """Since when there is no way any more, seconds; inf while there is one, also the old one."""
     climb: Climb | None = None
     """Of a goal over stairs."""
     recoveries: int = 0
@@ -323,7 +323,7 @@ class FastMarchingPlanner(Level):
         if not due and not path_is_blocked(
             occupancy, state.path.p_WP, position=position, radius=self._parameters.radius
         ):
-            return dc.replace(state, checked_version=occupancy.version)
+            return dc.replace(state, checked_version=occupancy.version, blocked_since=math.inf)
         plan = make_plan(
             occupancy,
             position=position,

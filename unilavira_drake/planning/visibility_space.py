@@ -3,7 +3,7 @@
 A voxel is blocked when some point of an occupied voxel may be nearer than the radius to some
 point of it; so whatever stays within voxels that are not blocked keeps the radius.  Below and
 above, margins may ask for more.  Unknown voxels are free until something is seen in them.  Each
-tile is kept as one bit a voxel; a new map only costs the tiles in which some voxel became
+tile is kept as one bit a voxel; a new map only costs the columns near to voxels that became
 occupied or free.
 """
 
@@ -26,6 +26,9 @@ from unilavira_drake.messages.voxels import TILE
 Key = tuple[int, int, int]
 Bits = NDArray[np.uint32]
 """(32, 32) uint32 of a tile: bit z of word [x, y]."""
+
+Area = tuple[int, int, int, int]
+"""Columns of a tile: lowest x and y, and one beyond the highest."""
 
 _NO_BITS: Bits = np.zeros((TILE, TILE), np.uint32)
 _NO_BITS.flags.writeable = False
@@ -54,6 +57,8 @@ class Clearance(Message):
     def columns(self, resolution: float) -> NDArray[np.int64]:
         """Returns (m, 4) offsets dx, dy of columns, and how far down and up each is to be free.
 
+        Those that are to be free equally far follow one another.
+
         Raises:
             ValueError: if that is more than 31 voxels.
         """
@@ -70,7 +75,7 @@ class Clearance(Message):
                 if gap < radius - 1e-9 or dx == dy == 0:
                     height = math.ceil(math.sqrt(max(radius**2 - gap**2, 0.0)) - 1e-9)
                     rows.append((dx, dy, max(height, below), max(height, above)))
-        return np.array(rows, np.int64)
+        return np.array(sorted(rows, key=lambda row: row[2:]), np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +126,7 @@ def update_space(space: FlightSpace, voxels: VoxelMap) -> FlightSpace:
         space = FlightSpace(VoxelMap(resolution=voxels.resolution), space.clearance)
     columns = space.clearance.columns(voxels.resolution)
     occupied = dict(space.occupied.tiles)
-    stale: dict[Key, None] = {}
+    stale: dict[Key, list[Area]] = {}
     reach = int(columns[:, 1:].max(initial=0))
     for key in {**space.voxels.tiles, **voxels.tiles}:
         tile = voxels.tiles.get(key)
@@ -136,42 +141,48 @@ def update_space(space: FlightSpace, voxels: VoxelMap) -> FlightSpace:
             continue
         new.flags.writeable = False
         occupied[key] = new
-        stale.update(dict.fromkeys(_touched(key, changes, reach)))
+        for touched, area in _touched(key, changes, reach):
+            stale.setdefault(touched, []).append(area)
     if not stale:
         return FlightSpace(voxels, space.clearance, space.occupied, space.blocked)
+    solid = BitTiles.of(occupied)
     blocked = dict(space.blocked.tiles)
-    for key in stale:
-        blocked[key] = _inflated(occupied, key, columns)
-    return FlightSpace(voxels, space.clearance, BitTiles.of(occupied), BitTiles.of(blocked))
+    for key, areas in stale.items():
+        low_x, low_y, high_x, high_y = zip(*areas, strict=True)
+        area = (min(low_x), min(low_y), max(high_x), max(high_y))
+        bits = np.array(blocked.get(key, _NO_BITS))
+        _inflate(solid.pool, solid.directory, solid.first, key, columns, area, bits)
+        bits.flags.writeable = False
+        blocked[key] = bits
+    return FlightSpace(voxels, space.clearance, solid, BitTiles.of(blocked))
 
 
-def _touched(key: Key, changes: Bits, reach: int) -> list[Key]:
-    """Returns the tiles with voxels within ``reach`` of the changed ones."""
+def _touched(key: Key, changes: Bits, reach: int) -> list[tuple[Key, Area]]:
+    """Returns the tiles with voxels within ``reach`` of the changed ones, and their columns."""
     depth = int(np.bitwise_or.reduce(changes, axis=None))
-    heights = np.array([depth >> z & 1 for z in range(TILE)], np.bool_)
-    sides: Any = (changes.any(axis=1), changes.any(axis=0), heights)
-    steps = []
-    for side in sides:
-        first, last = int(np.argmax(side)), TILE - 1 - int(np.argmax(side[::-1]))
-        steps.append(
-            (*((-1,) if first < reach else ()), 0, *((1,) if last + reach >= TILE else ()))
-        )
+    lowest, highest = (depth & -depth).bit_length() - 1, depth.bit_length() - 1
+    heights = [0]
+    if lowest < reach:
+        heights.append(-1)
+    if highest + reach >= TILE:
+        heights.append(1)
+    x, y = (_spread(np.flatnonzero(changes.any(axis=axis)), reach) for axis in (1, 0))
     a, b, c = key
-    return [(a + x, b + y, c + z) for x in steps[0] for y in steps[1] for z in steps[2]]
+    return [
+        ((a + i, b + j, c + k), (x0, y0, x1, y1))
+        for i, x0, x1 in x
+        for j, y0, y1 in y
+        for k in heights
+    ]
 
 
-def _inflated(occupied: Mapping[Key, Bits], key: Key, columns: NDArray[np.int64]) -> Bits:
-    a, b, c = key
-    around = np.empty((3, 3 * TILE, 3 * TILE), np.uint32)
-    for z in range(3):
-        for x in range(3):
-            for y in range(3):
-                block = occupied.get((a + x - 1, b + y - 1, c + z - 1), _NO_BITS)
-                around[z, x * TILE : (x + 1) * TILE, y * TILE : (y + 1) * TILE] = block
-    blocked = np.zeros((TILE, TILE), np.uint32)
-    _inflate(around, columns, blocked)
-    blocked.flags.writeable = False
-    return blocked
+def _spread(changed: NDArray[np.intp], reach: int) -> list[tuple[int, int, int]]:
+    """Returns the tiles on one axis that changed lines reach, each with its lines [low, high)."""
+    low, high = int(changed[0]) - reach, int(changed[-1]) + reach + 1
+    return [
+        (i, max(low - TILE * i, 0), min(high - TILE * i, TILE))
+        for i in range(low // TILE, (high - 1) // TILE + 1)
+    ]
 
 
 @kernel
@@ -186,22 +197,59 @@ def _pack(tile: NDArray[np.int8], bits: Bits) -> None:
 
 
 @kernel
-def _inflate(around: NDArray[np.uint32], columns: NDArray[np.int64], blocked: Bits) -> None:
-    """Fills the blocked bits of a tile from the words of it and its neighbours."""
+def _inflate(
+    pool: NDArray[np.uint32],
+    directory: NDArray[np.int32],
+    first: Key,
+    key: Key,
+    columns: NDArray[np.int64],
+    area: Area,
+    blocked: Bits,
+) -> None:
+    """Fills the blocked bits of some columns of a tile from the words of it and its neighbours."""
+    around = _around(pool, directory, first, key)
     half = np.uint64(32)
-    for x in range(TILE):
-        for y in range(TILE):
+    for x in range(area[0], area[2]):
+        for y in range(area[1], area[3]):
             word = np.uint64(0)
+            under, here, over = np.uint64(0), np.uint64(0), np.uint64(0)
             for row in range(len(columns)):
-                i, j = x + TILE + columns[row, 0], y + TILE + columns[row, 1]
-                here = np.uint64(around[1, i, j])
-                rising = (here << half) | np.uint64(around[0, i, j])
-                falling = (np.uint64(around[2, i, j]) << half) | here
-                if rising != 0:
-                    word |= _smeared(rising, columns[row, 2], True) >> half
-                if falling != 0:
-                    word |= _smeared(falling, columns[row, 3], False)
+                words = around[x + TILE + columns[row, 0], y + TILE + columns[row, 1]]
+                under |= np.uint64(words[0])
+                here |= np.uint64(words[1])
+                over |= np.uint64(words[2])
+                down, up = columns[row, 2], columns[row, 3]
+                if row + 1 < len(columns) and columns[row + 1, 2] == down:
+                    if columns[row + 1, 3] == up:
+                        continue
+                # What is to be free equally far is smeared at once.
+                if under | here:
+                    word |= _smeared((here << half) | under, down, True) >> half
+                if here | over:
+                    word |= _smeared((over << half) | here, up, False)
+                under, here, over = np.uint64(0), np.uint64(0), np.uint64(0)
             blocked[x, y] = np.uint32(word & np.uint64(0xFFFFFFFF))
+
+
+@kernel
+def _around(
+    pool: NDArray[np.uint32], directory: NDArray[np.int32], first: Key, key: Key
+) -> NDArray[np.uint32]:
+    """Returns the words of a tile and its neighbours; (96, 96, 3)."""
+    around = np.zeros((3 * TILE, 3 * TILE, 3), np.uint32)
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                a, b, c = key[0] + i - 1, key[1] + j - 1, key[2] + k - 1
+                a, b, c = a - first[0], b - first[1], c - first[2]
+                known = 0 <= a < directory.shape[0] and 0 <= b < directory.shape[1]
+                if not known or c < 0 or c >= directory.shape[2] or directory[a, b, c] == 0:
+                    continue
+                tile = pool[directory[a, b, c]]
+                for x in range(TILE):
+                    for y in range(TILE):
+                        around[TILE * i + x, TILE * j + y, k] = tile[x, y]
+    return around
 
 
 @kernel

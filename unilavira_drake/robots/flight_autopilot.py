@@ -61,9 +61,9 @@ class FlightAutopilot(LeafSystem):
         memory: Any = np.array(context.get_discrete_state(self._memory_index).value())
         rotors: Any = pilot(
             memory,
-            np.array(self._command(context)),
+            self._command(context),
             np.ascontiguousarray(self._pose(context).GetAsMatrix34()),
-            np.array(self._twist(context)),
+            self._twist(context),
             self._period,
             self._airframe,
             self._gains,

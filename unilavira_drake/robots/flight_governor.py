@@ -9,10 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
+from unilavira_drake.kernels import frozen_view
 from unilavira_drake.messages import Awaited, VoxelMap
+from unilavira_drake.messages.voxels import TILE, tiles_between
 from unilavira_drake.ports import message_input, pose_input, vector_input
 from unilavira_drake.robots.flight_limits import FlightLimits
-from unilavira_drake.robots.flight_stopping import braked, free_flight, next_yaw, warm_up, wished
+from unilavira_drake.robots.flight_stopping import (
+    braked,
+    free_flight,
+    next_yaw,
+    voxels_ahead,
+    warm_up,
+    wished,
+)
 from unilavira_drake.robots.stopping import stoppable_speed
 
 LEASH = 1.5
@@ -110,7 +119,7 @@ class FlightGovernor(LeafSystem):
         desired: Any = self._desired(context)
         old: Any = context.get_discrete_state(self._setpoint_index).value()
         valid = self._obeyed(context, desired)
-        X_WB = self._pose(context).GetAsMatrix34()
+        X_WB: Any = self._pose(context).GetAsMatrix34()
         p_WB = X_WB[:, 3]
         seen = bool(np.isfinite(p_WB).all())
         lost = self._lost(context, discrete_state, X_WB)
@@ -194,12 +203,18 @@ class FlightGovernor(LeafSystem):
         limits = self._limits
         stopping = speed**2 / (2.0 * limits.max_braking) + speed * limits.period
         horizon = stopping + self._standoff
-        end = p + horizon * direction
-        reach = self._radius + map_.resolution
-        low = np.floor((np.minimum(p, end) - reach) / map_.resolution).astype(np.int64)
-        high = np.floor((np.maximum(p, end) + reach) / map_.resolution).astype(np.int64) + 1
-        window = map_.window(tuple(low.tolist()), tuple(high.tolist()))
-        free = free_flight(window, low, map_.resolution, p, direction, horizon, self._radius)
+        reach, resolution = self._radius + map_.resolution, map_.resolution
+        bounds = voxels_ahead(p, direction, horizon, reach, resolution)
+        i, j, k, *beyond = bounds.tolist()
+        free = horizon
+        for key in tiles_between((i, j, k), (beyond[0], beyond[1], beyond[2])):
+            tile = map_.tiles.get(key)
+            if tile is None:
+                continue
+            voxels = frozen_view(tile, np.int8)
+            corner = (TILE * key[0], TILE * key[1], TILE * key[2])
+            way = (p, direction, horizon, self._radius)
+            free = min(free, free_flight(voxels, corner, bounds, resolution, *way))
         if free >= horizon:
             return speed
         return float(stoppable_speed(free - self._standoff, limits.max_braking, limits.period))

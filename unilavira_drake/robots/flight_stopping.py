@@ -7,15 +7,41 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from unilavira_drake.kernels import kernel
+from unilavira_drake.kernels import frozen_view, kernel
 from unilavira_drake.robots.drive_limits import approach, braking_speed
 from unilavira_drake.robots.flight_limits import FlightLimits
 
 
 @kernel
+def voxels_ahead(
+    p: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    horizon: float,
+    reach: float,
+    resolution: float,
+) -> NDArray[np.int64]:
+    """Returns the voxels within ``reach`` of a straight way; (6,): lowest, one beyond highest.
+
+    Args:
+        p: (3,) where it begins, metres.
+        direction: (3,) unit vector.
+        horizon: its length, metres.
+        reach: metres.
+        resolution: side of a voxel, metres.
+    """
+    bounds = np.empty(6, np.int64)
+    for axis in range(3):
+        end = p[axis] + horizon * direction[axis]
+        bounds[axis] = math.floor((min(p[axis], end) - reach) / resolution)
+        bounds[3 + axis] = math.floor((max(p[axis], end) + reach) / resolution) + 1
+    return bounds
+
+
+@kernel
 def free_flight(
     log_odds: NDArray[np.int8],
-    low: NDArray[np.int64],
+    corner: tuple[int, int, int],
+    bounds: NDArray[np.int64],
     resolution: float,
     p: NDArray[np.float64],
     direction: NDArray[np.float64],
@@ -29,8 +55,9 @@ def free_flight(
     what was seen.
 
     Args:
-        log_odds: int8 of a window of voxels; positive is occupied.
-        low: (3,) int64, the voxel of ``log_odds[0, 0, 0]``.
+        log_odds: int8 of some voxels; positive is occupied.
+        corner: the voxel of ``log_odds[0, 0, 0]``.
+        bounds: (6,) lowest voxel that counts, and one beyond the highest.
         resolution: side of a voxel, metres.
         p: (3,) where the ball is, metres.
         direction: (3,) unit vector.
@@ -39,14 +66,15 @@ def free_flight(
     """
     reach = radius + 0.5 * resolution
     best = horizon
-    for x in range(log_odds.shape[0]):
-        for y in range(log_odds.shape[1]):
-            for z in range(log_odds.shape[2]):
+    nx, ny, nz = log_odds.shape
+    for x in range(max(bounds[0] - corner[0], 0), min(bounds[3] - corner[0], nx)):
+        for y in range(max(bounds[1] - corner[1], 0), min(bounds[4] - corner[1], ny)):
+            for z in range(max(bounds[2] - corner[2], 0), min(bounds[5] - corner[2], nz)):
                 if log_odds[x, y, z] <= 0:
                     continue
-                qx = (low[0] + x + 0.5) * resolution - p[0]
-                qy = (low[1] + y + 0.5) * resolution - p[1]
-                qz = (low[2] + z + 0.5) * resolution - p[2]
+                qx = (corner[0] + x + 0.5) * resolution - p[0]
+                qy = (corner[1] + y + 0.5) * resolution - p[1]
+                qz = (corner[2] + z + 0.5) * resolution - p[2]
                 ahead = qx * direction[0] + qy * direction[1] + qz * direction[2]
                 if ahead <= 0.0:
                     continue
@@ -115,8 +143,9 @@ def next_yaw(yaw: float, desired: float, limits: FlightLimits) -> float:
 def warm_up() -> None:
     """Compiles the kernels, or loads them from numba's cache."""
     three, seven = np.zeros(3), np.zeros(7)
-    window = np.zeros((1, 1, 1), np.int8)
-    free_flight(window, np.zeros(3, np.int64), 1.0, three, np.ones(3), 1.0, 0.3)
+    window = frozen_view(np.zeros((1, 1, 1)), np.int8)
+    bounds = voxels_ahead(three, three, 1.0, 1.0, 1.0)
+    free_flight(window, (0, 0, 0), bounds, 1.0, three, three, 1.0, 0.3)
     braked(three, 1.0, 0.1)
     wished(seven, seven, np.zeros((2, 3)), FlightLimits())
     next_yaw(0.0, 0.0, FlightLimits())

@@ -35,7 +35,9 @@ class Governor(LeafSystem):
       while a model's reply is awaited for longer than ``reply_timeout``.
     * The base translates only on a map not older than ``map_timeout``, with a pose and a twist that
       are finite and a pose that changes when the twist says so, and only so fast that it still
-      stops (v^2 / 2a and one period) before its leading edge meets an occupied cell.
+      stops (v^2 / 2a and one period) before its leading edge meets an occupied cell.  Backwards
+      that is no more than what the cameras saw there before: one that looks to the front alone
+      shows nothing of what has come behind the base since.
     * Turning in place is never blocked by things: it is how a base gets out of a corner.  People
       go away, so while one is seen within what it would sweep, it waits.
     * Zero is reached by braking, never by a jump.

@@ -66,6 +66,25 @@ def next_gust(
     return out
 
 
+@kernel
+def drag(
+    air: NDArray[np.float64], body_state: NDArray[np.float64], linear: float, quadratic: float
+) -> NDArray[np.float64]:
+    """Returns the force of the air on a floating body, no torque and newtons in the world; (6,).
+
+    Args:
+        air: (3,) its velocity, m/s.
+        body_state: (13,) quaternion, position, [w; v] in the world.
+        linear: newtons by m/s.
+        quadratic: newtons by (m/s)^2.
+    """
+    against = air - body_state[10:13]
+    force = np.zeros(6)
+    force[3:] = (linear + quadratic * math.sqrt(np.sum(against * against))) * against
+    return force
+
+
 def warm_up() -> None:
     """Compiles the kernels, or loads them from numba's cache."""
+    drag(np.zeros(3), np.zeros(13), 0.0, 0.0)
     next_gust(np.zeros(3), 0, 0, 0.01, 1.0, 1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -13,6 +14,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from unilavira_drake.errors import ScenarioError
 from unilavira_drake.ports import vector_input
 from unilavira_drake.robots.planar_base import BASE_JOINTS, HEIGHT_JOINT
 
@@ -90,21 +92,31 @@ class TerrainFollower(LeafSystem):
         output.SetFromVector([*positions, *np.insert(desired[half:], self._slot, 0.0)])
 
 
-def climbing_model(text: str) -> str:
+def climbing_model(path: Path) -> str:
     """Returns the SDF of a ground robot with a height joint between its planar base and its body.
 
     Args:
-        text: of an SDF whose joint ``base_yaw`` carries the link ``base``.
+        path: of an SDF whose joint ``base_yaw`` carries the link ``base``.  URIs that are relative
+            to its folder are absolute in what is returned.
 
     Raises:
-        ValueError: if it has no such joint.
+        ScenarioError: if it is no SDF or has no such joint.
     """
-    root = ElementTree.fromstring(text)
+    try:
+        root = ElementTree.fromstring(path.read_text(encoding="utf-8"))
+    except (ElementTree.ParseError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"robot.model: {str(path)!r} is no SDF: {error}.") from None
     model = root.find("model")
     yaw = None if model is None else model.find("joint[@name='base_yaw']")
     child = None if yaw is None else yaw.find("child")
     if model is None or child is None:
-        raise ValueError("the model has no joint base_yaw that could carry a height joint")
+        raise ScenarioError(
+            f"robot.model: {str(path)!r} has no joint base_yaw in the model of an SDF; a robot "
+            "with can_climb: true needs one. Convert it to SDF, or give robot.can_climb: false."
+        )
+    for uri in root.iter("uri"):
+        if uri.text and "://" not in uri.text:
+            uri.text = f"file://{path.resolve().parent / uri.text.strip()}"
     body, child.text = child.text, "lift"
     ElementTree.register_namespace("drake", "drake.mit.edu")
     mass = sum(float(one.text or 0.0) for one in model.iterfind("link/inertial/mass"))

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from unilavira_drake.ports import vector_input
-from unilavira_drake.robots.gusts import next_gust, warm_up
+from unilavira_drake.robots.gusts import drag, next_gust, warm_up
 
 
 class WindModel(NamedTuple):
@@ -94,8 +94,5 @@ class Wind(LeafSystem):
             )
             air = self._steady + self._sides * gust
             discrete_state.set_value(self._air_index, air)
-        against = air - self._body_state(context)[10:]
-        linear, quadratic = self._drag
-        force = np.zeros(6)
-        force[3:] = (linear + quadratic * math.sqrt(float(against @ against))) * against
-        discrete_state.set_value(self._force_index, force)  # type: ignore[arg-type]
+        force: Any = drag(air, self._body_state(context), *self._drag)
+        discrete_state.set_value(self._force_index, force)

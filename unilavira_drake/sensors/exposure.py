@@ -47,7 +47,8 @@ class ExposureControl(LeafSystem):
     """Sets the gain of the colour images of all views.
 
     Locked, it looks at the first front picture when the simulation begins, and again each time
-    ``recalibrations``, a count, grows; the gain is in the Context.
+    ``recalibrations``, a count, grows; the gain is in the Context, and one that was locked is kept
+    by whoever initializes a clone of it.
 
     .. pydrake_system::
 
@@ -75,11 +76,11 @@ class ExposureControl(LeafSystem):
                 f"{view}.color_image", Value[ImageRgba8U], functools.partial(self._expose, view)
             )
         if self._locked:
-            # Gain and recalibrations seen.
+            # Gain, 0 while it is not locked, and recalibrations seen.
             self._recalibrations = self.DeclareVectorInputPort("recalibrations", 1)
-            unlocked: Any = np.array([1.0, 0.0])
+            unlocked: Any = np.array([0.0, 0.0])
             self._index = int(self.DeclareDiscreteState(unlocked))
-            self.DeclareInitializationDiscreteUpdateEvent(self._lock)
+            self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.5 * period, self._update)
 
     def _count(self, context: Context) -> float:
@@ -87,6 +88,11 @@ class ExposureControl(LeafSystem):
             return 0.0
         count: Any = self._recalibrations.Eval(context)
         return float(count[0])
+
+    def _initialize(self, context: Context, discrete_state: DiscreteValues) -> None:
+        state: Any = context.get_discrete_state(self._index).value()
+        if state[0] == 0.0:
+            self._lock(context, discrete_state)
 
     def _lock(self, context: Context, discrete_state: DiscreteValues) -> None:
         gain = gain_for(pixels(self._raw["front"](context)), self._target)
@@ -102,7 +108,7 @@ class ExposureControl(LeafSystem):
         rgba = pixels(self._raw[view](context))
         if self._locked:
             state: Any = context.get_discrete_state(self._index).value()
-            gain = float(state[0])
+            gain = float(state[0]) or 1.0
         else:
             gain = gain_for(rgba, self._target)
         image = ImageRgba8U(rgba.shape[1], rgba.shape[0])
