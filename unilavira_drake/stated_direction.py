@@ -6,6 +6,7 @@ nothing of the goal beyond the words.
 
 from __future__ import annotations
 
+import itertools
 import re
 from dataclasses import dataclass
 
@@ -67,7 +68,7 @@ def _nearest(sentence: str, where: int) -> float | None:
         # A comma before the bearing does not part it from its own distance: "80 m away, ahead".
         stated = any(
             start <= match.start() < end and _STATES.search(sentence, start, end)
-            for start, end in zip(clauses, clauses[1:], strict=False)
+            for start, end in itertools.pairwise(clauses)
         )
         return not stated, high - low
 

@@ -1,6 +1,5 @@
 """The flight governor alone: limits, fence, watchdogs, and stopping before whatever is ahead."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
