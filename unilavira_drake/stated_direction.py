@@ -6,7 +6,6 @@ nothing of the goal beyond the words.
 
 from __future__ import annotations
 
-import itertools
 import re
 from dataclasses import dataclass
 
@@ -27,7 +26,6 @@ _PLAIN = {
 _A_LITTLE = re.compile(r"\b(?:a little|slightly) to (?:your|the) (?:left|right)\b")
 SLIGHT = 12.0
 """What ``a little to your left`` means, degrees."""
-_CLAUSE = re.compile(r", | and | but | then ")
 _STATES = re.compile(r"\b(?:is|lies|located|stands|away|waits)\b")
 
 
@@ -45,8 +43,7 @@ def stated_direction(task: str) -> StatedDirection | None:
     """Returns the place that a task states by distance and angle, or None where it states none.
 
     An angle without a side counts to the right, as OpenUAV's yaw does.  An order (``fly 40 m
-    ahead``) states no place.  Of several distances that counts which stands nearest to the bearing,
-    in its own clause if there is one.
+    ahead``) states no place.  Of several distances that counts which stands nearest to the bearing.
     """
     for sentence in re.split(r"(?<=[.;!?])\s+", task.lower()):
         bearing = _bearing(sentence)
@@ -61,19 +58,14 @@ def stated_direction(task: str) -> StatedDirection | None:
 
 def _nearest(sentence: str, where: int) -> float | None:
     """Returns the distance that stands nearest to a place of a sentence, metres."""
-    clauses = [0, *(match.end() for match in _CLAUSE.finditer(sentence)), len(sentence)]
+    nearest = min(
+        _DISTANCE.finditer(sentence), key=lambda match: abs(match.start() - where), default=None
+    )
+    return None if nearest is None else _number(nearest.group(1))
 
-    def away(match: re.Match[str]) -> tuple[bool, int]:
-        low, high = sorted((match.start(), where))
-        # A comma before the bearing does not part it from its own distance: "80 m away, ahead".
-        stated = any(
-            start <= match.start() < end and _STATES.search(sentence, start, end)
-            for start, end in itertools.pairwise(clauses)
-        )
-        return not stated, high - low
 
-    nearest = min(_DISTANCE.finditer(sentence), key=away, default=None)
-    return None if nearest is None else float(nearest.group(1).replace(",", ""))
+def _number(digits: str) -> float:
+    return float(digits.replace(",", ""))
 
 
 def _bearing(sentence: str) -> tuple[float, int] | None:
@@ -81,7 +73,7 @@ def _bearing(sentence: str) -> tuple[float, int] | None:
     angle = _ANGLE.search(sentence)
     if angle is not None:
         sign = 1.0 if angle.group(3) == "left" else -1.0
-        degrees = float(angle.group(2).replace(",", ""))
+        degrees = _number(angle.group(2))
         return (-sign if angle.group(1) else sign) * degrees, angle.start()
     little = _A_LITTLE.search(sentence)
     if little is not None and "ahead" in sentence:
