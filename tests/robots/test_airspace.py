@@ -11,12 +11,12 @@ FLIES = "robot: !Quadrotor {}\n"
 
 @pytest.mark.parametrize("place", ["bathroom", "7.0,8.4,2.8,1.57"])
 def test_an_aircraft_indoors_takes_off_from_the_ground_floor(place):
-    task = f"start: '{place}'\ntask: {{text: '@sofa'}}"
+    task = f"task: {{text: Go to the sofa., start: '{place}'}}"
     load_scenario("two_storey", f"robot: !UnitreeGo1 {{can_climb: true}}\n{task}")
     with pytest.raises(TaskError, match=r"ground floor; choose .* or another robot") as caught:
         load_scenario("two_storey", FLIES + task)
     assert repr(place) in str(caught.value)
-    load_scenario("two_storey", f"{FLIES}start: kitchen\ntask: {{text: '@sofa'}}")
+    load_scenario("two_storey", FLIES + "task: {text: Go to the sofa., start: kitchen}")
 
 
 @pytest.mark.parametrize(
@@ -27,7 +27,7 @@ def test_an_aircraft_indoors_takes_off_from_the_ground_floor(place):
     ],
 )
 def test_a_start_outside_the_airspace_is_refused(flight, words):
-    start = "start: 200,300,25,0\ntask: {text: Fly., family: aerial_vln}"
+    start = "task: {text: Fly to the church., start: '200,300,25,0'}"
     load_scenario("town", start)
     with pytest.raises(TaskError, match=words):
         load_scenario("town", f"flight: {flight}\n{start}")
@@ -45,9 +45,12 @@ def test_fence_and_wind_are_mirrored_with_the_world():
 
 
 def test_a_start_in_a_mirrored_world_is_seen_within_the_mirrored_fence():
-    task = "start: 200,300,25,0\ntask: {text: Fly., family: aerial_vln}"
-    fence = "flight: {geofence: [100, 200, 300, 380]}"
-    load_scenario("town", f"world: {{name: town, mirror: true}}\n{fence}\n{task}")
+    task = "task: {text: Fly to the church., start: '200,300,25,0'}"
+    for mirror in ("false", "true"):
+        world = f"world: {{name: town, mirror: {mirror}}}"
+        load_scenario("town", f"{world}\nflight: {{geofence: [100, 200, 300, 380]}}\n{task}")
+        with pytest.raises(TaskError, match="outside flight.geofence"):
+            load_scenario("town", f"{world}\nflight: {{geofence: [100, 0, 300, 200]}}\n{task}")
 
 
 def test_the_town_has_a_fence_around_it():
