@@ -109,7 +109,7 @@ def _watched(simulator: Simulator, diagram: Any, drawing: list[float]) -> dict[s
     errors, moving, cpu, way = [], 0.0, 0.0, 0.0
     last = np.array(output("station", "cheat_X_WB").translation())
     while output("navigation", "navigation_status").n < len(ROUTE):
-        begun, drawn, at = time.thread_time(), drawing[0], last
+        drawn, at = drawing[0], last
         spent = 0.0
         for _ in range(round(CHUNK / SAMPLE)):
             begun = time.thread_time()

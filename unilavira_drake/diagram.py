@@ -141,7 +141,7 @@ def make_navigation_diagram(
             intrinsics=intrinsics,
             mapping=mapping_among(scenario.people, scenario.mapping),
             planning=planning_among(scenario.people, scenario.planning),
-            flight=scenario.flight,
+            flight=scenario.flight.within(mirrored=world.mirrored),
             tick=scenario.tick,
             time_step=plant_config(scenario).time_step,
             replace=own,

@@ -85,6 +85,7 @@ def run_episode(
         world,
         radius=scenario.robot.turning_radius,
         climbs=scenario.robot.leaves_the_ground,
+        flies=scenario.robot.flies,
     )
     goal = None
     if task.goal:

@@ -56,6 +56,7 @@ def episode_result(
             navigation_error_m=verdict.navigation_error_m,
             path_length_m=round(verdict.path_length_m, 4),
             shortest_path_m=verdict.shortest_path_m,
+            path_type=verdict.path_type,
             spl=verdict.spl,
             oracle_success=verdict.oracle_success,
             same_room=verdict.same_room,

@@ -24,6 +24,7 @@ from unilavira_drake.mllm.latency import (
 )
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
 from unilavira_drake.people.crowd import make_crowd, with_people
+from unilavira_drake.robots.flight_config import FlightConfig
 from unilavira_drake.robots.robot import GroundRobot
 from unilavira_drake.scenario import (
     ABLATIONS,
@@ -130,12 +131,16 @@ def validate(scenario: Scenario) -> None:
     _check_periods(scenario)
     _check_tasks(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
+    text = choose_task(scenario).start
     start = parse_start_pose(
-        choose_task(scenario).start,
+        text,
         world,
         radius=scenario.robot.turning_radius,
         climbs=scenario.robot.leaves_the_ground,
+        flies=scenario.robot.flies,
     )
+    if scenario.robot.flies:
+        _check_air_start(text, start, scenario.flight.within(mirrored=world.mirrored))
     _check_people(scenario, world, start[:2])
 
 
@@ -262,6 +267,26 @@ def _check_air(scenario: Scenario) -> None:
     if len(fence) != 4 or not finite or fence[0] >= fence[2] or fence[1] >= fence[3]:
         raise ScenarioError(
             f"flight.geofence: {fence} is not usable; give x_min, y_min, x_max, y_max in metres."
+        )
+
+
+def _check_air_start(
+    text: str, start: tuple[float, float, float, float], flight: FlightConfig
+) -> None:
+    """An aircraft starts within the airspace that it must not leave, or below it."""
+    x, y, z, _ = start
+    if z > flight.max_altitude:
+        raise TaskError(
+            f"start: {text!r} is at height {z:g}, above flight.max_altitude "
+            f"({flight.max_altitude:g}); start lower, or raise flight.max_altitude."
+        )
+    if not flight.geofence:
+        return
+    x_min, y_min, x_max, y_max = flight.geofence
+    if not (x_min <= x <= x_max and y_min <= y <= y_max):
+        raise TaskError(
+            f"start: {text!r} is at {x:g},{y:g}, outside flight.geofence ([{x_min:g}, {y_min:g}, "
+            f"{x_max:g}, {y_max:g}] there); choose a start within, or a larger fence."
         )
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from unilavira_drake.messages import Message
 
-_NUMBER = r"(\d+(?:\.\d+)?)"
-_DISTANCE = re.compile(rf"\b{_NUMBER} ?(?:m|meters?|metres?)\b")
+_NUMBER = r"(\d{1,3}(?:,\d{3})+(?:\.\d+)?|\d+(?:\.\d+)?)"
+_DISTANCE = re.compile(rf"(?<![\d.,]){_NUMBER} ?(?:m|meters?|metres?)\b")
 _ANGLE = re.compile(
     rf"(-?){_NUMBER} ?(?:degrees?|deg|°)(?: (?:to|on|from|at) (?:the|your|you))?(?: (left|right))?"
 )
@@ -43,21 +43,42 @@ def stated_direction(task: str) -> StatedDirection | None:
     """Returns the place that a task states by distance and angle, or None where it states none.
 
     An angle without a side counts to the right, as OpenUAV's yaw does.  An order (``fly 40 m
-    ahead``) states no place.
+    ahead``) states no place.  Of several distances that counts which stands nearest to the bearing.
     """
     for sentence in re.split(r"(?<=[.;!?])\s+", task.lower()):
-        distance = _DISTANCE.search(sentence)
         bearing = _bearing(sentence)
-        if distance is not None and bearing is not None and _STATES.search(sentence):
-            return StatedDirection(float(distance.group(1)), bearing)
+        if bearing is None or not _STATES.search(sentence):
+            continue
+        degrees, where = bearing
+        distance = _nearest(sentence, where)
+        if distance is not None:
+            return StatedDirection(distance, degrees)
     return None
 
 
-def _bearing(sentence: str) -> float | None:
+def _nearest(sentence: str, where: int) -> float | None:
+    """Returns the distance that stands nearest to a place of a sentence, metres."""
+    nearest = min(
+        _DISTANCE.finditer(sentence), key=lambda match: abs(match.start() - where), default=None
+    )
+    return None if nearest is None else _number(nearest.group(1))
+
+
+def _number(digits: str) -> float:
+    return float(digits.replace(",", ""))
+
+
+def _bearing(sentence: str) -> tuple[float, int] | None:
+    """Returns degrees to the left, and where in the sentence they stand."""
     angle = _ANGLE.search(sentence)
     if angle is not None:
         sign = 1.0 if angle.group(3) == "left" else -1.0
-        return (-sign if angle.group(1) else sign) * float(angle.group(2))
-    if _A_LITTLE.search(sentence) and "ahead" in sentence:
-        return SLIGHT if "left" in sentence else -SLIGHT
-    return next((value for words, value in _PLAIN.items() if words in sentence), None)
+        degrees = _number(angle.group(2))
+        return (-sign if angle.group(1) else sign) * degrees, angle.start()
+    little = _A_LITTLE.search(sentence)
+    if little is not None and "ahead" in sentence:
+        return (SLIGHT if "left" in little.group() else -SLIGHT), sentence.index("ahead")
+    return next(
+        ((value, sentence.index(words)) for words, value in _PLAIN.items() if words in sentence),
+        None,
+    )

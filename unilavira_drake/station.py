@@ -137,7 +137,7 @@ def make_navigation_station(
         localization=scenario.pose_estimate,
         seed=scenario.random_seed,
         ground_height=world.ground_height,
-        wind=_wind(scenario),
+        wind=_wind(scenario, world),
     )
     base = plant.GetBodyByName("base", model_instance)
     if people:
@@ -163,14 +163,15 @@ def make_navigation_station(
     return station
 
 
-def _wind(scenario: Scenario) -> WindModel:
-    wind = scenario.flight.wind
+def _wind(scenario: Scenario, world: World) -> WindModel:
+    wind = scenario.flight.within(mirrored=world.mirrored).wind
     return WindModel(
         wind.speed,
         math.radians(wind.direction_degrees),
         wind.gusts,
         wind.correlation_time,
         scenario.random_seed,
+        world.mirrored,
     )
 
 

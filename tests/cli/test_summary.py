@@ -86,3 +86,9 @@ def test_an_answer_is_no_markup_and_no_command_to_the_terminal(answer: str) -> N
     shown = answer.replace("\x1b", " ").replace("\x07", " ").strip()
     metrics = dataclasses.replace(ANSWERED.metrics, answer=answer)
     assert row(printed(dataclasses.replace(ANSWERED, metrics=metrics)), "answer") == shown
+
+
+def test_only_a_flight_has_a_path_type() -> None:
+    flown = dataclasses.replace(ANSWERED, metrics=MetricsResult(path_type="hard"))
+    assert row(printed(flown), "path type") == "hard"
+    assert "path type" not in printed(ANSWERED)

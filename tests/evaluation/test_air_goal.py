@@ -121,6 +121,9 @@ def test_a_start_within_twenty_metres_has_no_spl():
 
 def test_easy_ends_at_two_hundred_and_fifty_metres():
     assert (path_type(250.0), path_type(250.1)) == ("easy", "hard")
+    assert scored(ended(90.0, 50.0, 5.0)).path_type == "easy"
+    assert goal().path_type(300.0) == "hard"
+    assert goal().path_type(math.inf) is None
 
 
 def test_the_area_of_success_is_what_lies_within_twenty_metres():

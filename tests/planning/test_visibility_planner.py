@@ -177,8 +177,75 @@ def test_hovering_is_stuck_even_while_the_map_changes():
     for k in range(29):
         bench.give("voxel_map", worlds.voxels_of([GROUND], version=2 + k))
         assert bench.wait().state == "moving"
+        assert not bench.path.backwards
     assert bench.path.version >= 2
+    # It came from nowhere: there is no way back, only another plan.
+    assert bench.wait(3).state == "moving"
+    assert bench.wait(32) == NavigationStatus(1, "failed", "stuck")
+
+
+def test_a_stuck_aircraft_backs_off_as_it_came_plans_anew_and_only_then_fails():
+    bench = Bench(stuck_time=3.0)
+    bench.give("goal", go())
+    bench.wait()
+    way = worlds.along(bench.path.p_WP)
+    bench.fly(2.0, 20)
+    stuck = tuple(bench.position)
+    for k in range(33):
+        # It wavers by what would be many steps, and does not forget the way it came.
+        bench.stand(stuck[0], 0.2 * (k % 2), stuck[2])
+        assert bench.wait().state == "moving"
+    back = bench.path
+    assert back.backwards
+    np.testing.assert_allclose(back.p_WP[0], bench.position)
+    came = back.p_WP[1:]
+    assert np.linalg.norm(came[:, None] - way[None], axis=2).min(axis=1).max() < 0.05
+    assert 1.5 <= stuck[0] - came[-1, 0] <= 3.5
+    bench.stand(*came[-1])
+    assert bench.wait().state == "moving"
+    assert not bench.path.backwards
+    assert bench.path.version > back.version
+    np.testing.assert_allclose(bench.path.p_WP[[0, -1]], [came[-1], (20.0, 0.0, 5.0)])
+    assert bench.wait(29).state == "moving"
     assert bench.wait(3) == NavigationStatus(1, "failed", "stuck")
+    assert not len(bench.path.p_WP)
+
+
+def test_an_aircraft_that_cannot_go_back_either_plans_anew_after_a_while():
+    bench = Bench(stuck_time=3.0)
+    bench.stand(-9.0, 0.0, 4.0)
+    bench.give("goal", go(p_WG=(0.0, 0.0, 4.0)))
+    bench.wait()
+    bench.fly(4.0, 60)
+    assert bench.status.state == "arrived"
+    bench.give("goal", go(n=2))
+    bench.give("voxel_map", worlds.voxels_of([GROUND], n=2))
+    bench.wait(34)
+    # The way to the goal before counts, too.
+    assert bench.path.backwards
+    assert bench.path.p_WP[-1, 0] < -1.0
+    assert bench.wait(74).state == "moving"
+    assert bench.path.backwards
+    bench.wait(6)
+    assert not bench.path.backwards
+    assert bench.wait(34).reason == "stuck"
+    # The next goal has its own recovery.
+    bench.give("voxel_map", worlds.voxels_of([GROUND], n=3))
+    bench.give("goal", go(n=3))
+    assert bench.wait(34).state == "moving"
+    assert bench.path.backwards
+
+
+def test_a_pose_that_is_lost_on_the_way_back_fails_at_last():
+    bench = Bench(stuck_time=3.0)
+    bench.give("goal", go())
+    bench.wait()
+    bench.fly(2.0, 20)
+    bench.wait(33)
+    assert bench.path.backwards
+    bench.stand(math.nan, 0.0, 4.0)
+    assert bench.wait(60).state == "moving"
+    assert bench.wait(25) == NavigationStatus(1, "failed", "the pose is lost")
 
 
 def test_wandering_without_end_uses_up_the_travel_budget():
@@ -216,8 +283,8 @@ def test_a_cloned_context_has_the_same_future():
     bench.give("goal", go())
     bench.wait()
     branch = Simulator(bench.planner, bench.context.Clone())
-    branch.AdvanceTo(9.0)
-    bench.simulator.AdvanceTo(9.0)
+    branch.AdvanceTo(15.0)
+    bench.simulator.AdvanceTo(15.0)
     other = bench.planner.GetOutputPort("navigation_status").Eval(branch.get_context())
     assert other == bench.status == NavigationStatus(1, "failed", "stuck")
 

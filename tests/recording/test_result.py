@@ -59,7 +59,7 @@ def test_the_file_holds_the_public_names() -> None:
     assert set(data["model"]) == {"language", "vision", "perception", "reasoning"}
     assert set(data["metrics"]) >= words(
         "navigation_error_m path_length_m shortest_path_m spl oracle_success collisions "
-        "max_contact_force_n answer answer_correct answer_score"
+        "path_type max_contact_force_n answer answer_correct answer_score"
     )
     assert set(data["counts"]) == words(
         "decisions language_calls vision_calls reasks fallbacks backtracks"

@@ -1,7 +1,5 @@
 """The flight governor alone: limits, fence, watchdogs, and stopping before whatever is ahead."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,7 +15,7 @@ from unilavira_drake.robots.flight_stopping import free_flight, voxels_ahead
 
 LIMITS = FlightLimits()
 NO_FENCE = np.array([[-np.inf] * 3, [np.inf] * 3])
-RESOLUTION, RADIUS = 0.1, 0.27
+RESOLUTION, RADIUS, STANDOFF = 0.1, 0.27, 0.25
 
 
 def map_of(voxels, time=0.0):
@@ -116,7 +114,8 @@ def test_it_stops_before_a_wall_from_any_side(distance, across, height):
     voxels = wall(distance)
     bench = Bench(voxels)
     rows = bench.chase((distance + 3.0, across, height), ticks=200)
-    assert gap(voxels, rows) >= RADIUS - 0.05
+    # The standoff is kept along the way, which may lead to the wall at an angle.
+    assert gap(voxels, rows) >= RADIUS + 0.8 * STANDOFF
     assert np.linalg.norm(rows[-1, 4:]) < 0.2
 
 
@@ -128,10 +127,10 @@ def test_what_turns_up_ahead_is_braked_for_at_once(when, ahead):
     rows = [bench.chase((9.0, 0.0, 1.0), ticks=round(when / LIMITS.period) + 1)[-1]]
     speed = float(np.linalg.norm(rows[0][4:]))
     stopping = speed**2 / (2 * LIMITS.max_braking) + LIMITS.period * speed
-    bench.voxels = wall(bench.pose[0] + RADIUS + stopping + ahead * 0.3 + 0.1)
+    bench.voxels = wall(bench.pose[0] + RADIUS + stopping + ahead * 0.3 + STANDOFF)
     bench.fix_map(bench.time)
     rows = bench.chase((9.0, 0.0, 1.0), ticks=80)
-    assert gap(bench.voxels, rows) >= RADIUS - 0.05
+    assert gap(bench.voxels, rows) >= RADIUS + STANDOFF - 0.1
     assert np.linalg.norm(rows[-1, 4:]) < 0.05
 
 
@@ -220,15 +219,16 @@ def test_the_free_way_is_that_of_a_ball_marched_in_small_steps(seed):
     nowhere = np.array([3, 3, 3, 3, 3, 3])
     assert free_flight(window, (0, 0, 0), nowhere, 0.1, p, direction, 1.0, radius) == 1.0
     centers = (np.argwhere(window > 0) + 0.5) * 0.1
-    reach = radius + 0.05
     steps = np.arange(0.0, 1.0, 0.002)
-    expected = 1.0
+    # What is only grazed may count or not.
+    least, most = (1.0, 1.0)
     for center in centers:
-        if (center - p) @ direction <= 0.0:
+        off = np.abs(p + np.outer(steps, direction) - center) - 0.05
+        distances = np.linalg.norm(np.maximum(off, 0.0), axis=1)
+        inside = distances[0] == 0.0
+        if (center - p) @ direction <= 0.0 if inside else distances.argmin() == 0:
             continue
-        distances = np.linalg.norm(p + np.outer(steps, direction) - center, axis=1)
-        hit = np.flatnonzero(distances < reach)
-        if len(hit):
-            expected = min(expected, steps[hit[0]])
-    assert found == pytest.approx(expected, abs=0.03)
-    assert math.isfinite(found)
+        near, hit = (np.flatnonzero(distances < radius + slack) for slack in (0.003, -0.003))
+        least = min(least, steps[near[0]] if len(near) else 1.0)
+        most = min(most, steps[hit[0]] if len(hit) else 1.0)
+    assert least - 0.01 <= found <= most + 0.01

@@ -15,14 +15,14 @@ LIMITS = FlightLimits()
 POINT = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.5, 4))
 
 
-def flown(path, *, start=None, yaw=0.0, ticks=1500):
+def flown(path, *, start=None, yaw=0.0, ticks=1500, backwards=False):
     """Rolls the reference out with an aircraft that is always where it should be."""
     path = np.array(path, float)
     reference = np.array([*(path[0] if start is None else start), yaw, 0.0, 0.0, 0.0])
     rows, travelled = [reference], math.nan
     for _ in range(ticks):
         *moved, travelled = follow(
-            path, reference, reference[:3], reference[3], travelled, 4.0, LIMITS
+            path, reference, reference[:3], reference[3], travelled, backwards, 4.0, LIMITS
         )
         reference = np.array(moved)
         rows.append(reference)
@@ -103,8 +103,8 @@ def test_it_waits_for_an_aircraft_that_is_held_up():
     path = np.array([(0.0, 0, 1), (9.0, 0, 1)])
     reference, travelled = np.array([0.0, 0, 1, 0, 0, 0, 0]), math.nan
     for _ in range(400):
-        *moved, travelled = follow(path, reference, np.array([0.0, 0, 1]), 0.0, travelled, 4.0,
-                                   LIMITS)  # fmt: skip
+        hangs = (reference, np.array([0.0, 0, 1]), 0.0, travelled, False)
+        *moved, travelled = follow(path, *hangs, 4.0, LIMITS)
         reference = np.array(moved)
     assert reference[0] <= 1.05
     assert abs(reference[4]) < 1e-3
@@ -117,3 +117,12 @@ def test_without_a_path_it_comes_to_rest_and_turns():
     assert reference[0] == pytest.approx(1.0 / (2 * 0.8 * 1.5), abs=0.05)
     assert reference[3] == pytest.approx(2.0, abs=1e-3)
     assert not reference[4:].any()
+
+
+def test_backwards_is_the_same_way_at_once_with_the_nose_where_it_was():
+    path = [(0, 0, 1), (-1, 0, 1), (-1.5, 0.5, 1.2)]
+    back = flown(path, yaw=0.3, backwards=True)
+    assert (back[:, 3] == 0.3).all()
+    np.testing.assert_allclose(back[-1, :3], path[-1], atol=0.02)
+    assert distance_to(path, back[:, :3]).max() < 1e-6
+    assert len(back) < len(flown(path, yaw=0.3))

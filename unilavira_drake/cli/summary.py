@@ -56,6 +56,7 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
         ("stopped within 3 m", _YES_NO[metrics.success_3m]),
         ("path length", _metres(metrics.path_length_m)),
         ("shortest path", _metres(metrics.shortest_path_m)),
+        *_path_type(metrics.path_type),
         ("SPL", "-" if metrics.spl is None else f"{metrics.spl:.2f}"),
         ("collisions", str(metrics.collisions)),
         ("decisions", str(counts.decisions)),
@@ -72,6 +73,11 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
     if metrics.answer_correct is not None:
         rows.append(("answer correct", _YES_NO[metrics.answer_correct]))
     return [*rows, *judge_figures(result), *cost_figures(result.usage)]
+
+
+def _path_type(value: str | None) -> list[tuple[str, str]]:
+    """Only flights have one."""
+    return [] if value is None else [("path type", value)]
 
 
 def _metres(value: float | None) -> str:

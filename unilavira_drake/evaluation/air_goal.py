@@ -62,6 +62,10 @@ class AirGoal(GoalField):
             ways.append(max(air_way(self._space, start, nearest), math.dist(start, nearest)))
         return min(ways)
 
+    def path_type(self, way: float) -> str | None:
+        """Returns ``easy`` or ``hard`` for a reference way, metres; None where there is none."""
+        return path_type(way) if math.isfinite(way) else None
+
     def outlines(self, radius: float) -> tuple[NDArray[np.float64], ...]:
         """Returns what lies within a radius of each alternative seen from above, (k, 2) metres."""
         angle = 2.0 * math.pi * np.arange(_CIRCLE) / _CIRCLE

@@ -72,6 +72,11 @@ class GoalField(Message):
             )
         return min(self.distances(x, y, z))
 
+    def path_type(self, way: float) -> str | None:
+        """Returns how hard a way of this length is called; None on the ground."""
+        del way
+        return None
+
 
 @dataclass(frozen=True)
 class Score(Message):
@@ -83,6 +88,8 @@ class Score(Message):
     navigation_error_m: float | None = None
     path_length_m: float = 0.0
     shortest_path_m: float | None = None
+    path_type: str | None = None
+    """``easy`` or ``hard``, of a flight."""
     spl: float | None = None
     oracle_success: bool | None = None
     """Whether the robot ever was within the rule's radius."""
@@ -177,6 +184,7 @@ def score(
         navigation_error_m=error if math.isfinite(error) else None,
         path_length_m=metrics.path_length,
         shortest_path_m=shortest if math.isfinite(shortest) else None,
+        path_type=goal.path_type(shortest),
         spl=spl,
         oracle_success=rule.reached(min(closest, error)),
         same_room=in_room(nearest, goal.world, x, y, metrics.z),

@@ -79,7 +79,7 @@ class Path(Message):
     max_speed: float = math.inf
     """No faster than this, whatever the robot's limits, m/s: stairs are climbed slowly."""
     backwards: bool = False
-    """Whether the robot goes it backwards, straight, to get off where it is stuck."""
+    """Whether the robot goes it backwards, without turning, to get off where it is stuck."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))

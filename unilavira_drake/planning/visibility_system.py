@@ -18,6 +18,12 @@ from unilavira_drake.messages import (
     Path,
     VoxelMap,
 )
+from unilavira_drake.planning.flight_recovery import (
+    BACK_OFF_TIME,
+    MOST_RECOVERIES,
+    came_by,
+    way_back,
+)
 from unilavira_drake.planning.polyline import final_heading
 from unilavira_drake.planning.visibility import (
     FlightParameters,
@@ -70,6 +76,10 @@ class VisibilityPlannerState(Message):
     """Where travel was last added up, metres."""
     travelled: float = 0.0
     budget: float = 0.0
+    came: tuple[Point, ...] = ()
+    """Places that the aircraft came by, the latest first, metres."""
+    recoveries: int = 0
+    """How often it has backed off on the way to this goal."""
 
 
 class VisibilityPlanner(Level):
@@ -80,6 +90,10 @@ class VisibilityPlanner(Level):
     altitudes is moved to the nearest place within.  Unknown space is taken to be free.  While
     the aircraft moves, the way is planned anew when a new map blocks it, or when the map changed,
     the plan is ``replan_period`` old and the goal is not near.  ``path`` carries (k, 3) points.
+
+    An aircraft that is stuck backs off once for each goal, by the places that it came by and
+    without turning; then the way is planned anew.  Stuck again, it fails.
+
     Reasons of failure: the goal's own, ``unreachable``, ``no free space within ... m``, ``no free
     space around the aircraft``, ``too many voxels to search``, ``farther than ... m``, ``stuck``,
     ``travel budget``, and numbers that are none.
@@ -171,7 +185,8 @@ class VisibilityPlanner(Level):
         if not state.status.terminal and not len(state.path.p_WP):
             return self._take_off(state, self._map(context), self._position(context), time)
         if not state.status.terminal:
-            return self._follow(state, self._map(context), self._position(context), time)
+            go_on = self._back_off if state.path.backwards else self._follow
+            return go_on(state, self._map(context), self._position(context), time)
         goal = self._goal(context)
         if goal.n <= state.status.n:
             return state
@@ -225,6 +240,7 @@ class VisibilityPlanner(Level):
             space=state.space,
             progress_time=time,
             position=position,
+            came=came_by(state.came, position, self._tolerance),
         )
         return self._planned(fresh, voxels, position, None, time)
 
@@ -291,15 +307,36 @@ class VisibilityPlanner(Level):
             return _arrived(state, position, heading)
         step = math.dist(position, state.position)
         if step >= PROGRESS:
-            state = dc.replace(state, travelled=state.travelled + step, position=position)
+            state = dc.replace(
+                state,
+                travelled=state.travelled + step,
+                position=position,
+                came=came_by(state.came, position, self._tolerance),
+            )
         if state.travelled > state.budget:
             return _done(state, n, "failed", "travel budget", None)
         remaining, _ = remaining_way(state.path.p_WP, position)
         if remaining <= state.least_remaining - PROGRESS:
             state = dc.replace(state, least_remaining=remaining, progress_time=time)
+        elif late and state.recoveries < MOST_RECOVERIES:
+            back = way_back(state.path, state.came, position)
+            again = state.recoveries + 1
+            return dc.replace(state, path=back, plan_time=time, recoveries=again)
         elif late:
             return _done(state, n, "failed", "stuck", None)
         return self._replanned(state, voxels, position, (x, y, z), time)
+
+    def _back_off(
+        self, state: VisibilityPlannerState, voxels: VoxelMap, position: Point, time: float
+    ) -> VisibilityPlannerState:
+        """Returns the state with a new plan once the aircraft has backed off."""
+        waited = time - state.plan_time >= BACK_OFF_TIME
+        if not believable(position):
+            lost = _done(state, state.status.n, "failed", "the pose is lost", None)
+            return lost if waited else state
+        if not waited and math.dist(position, state.path.p_WP[-1]) > self._tolerance:
+            return state
+        return self._planned(dc.replace(state, progress_time=time), voxels, position, None, time)
 
     def _replanned(
         self,
@@ -355,5 +392,8 @@ def _done(
 ) -> VisibilityPlannerState:
     """Returns the terminal state of goal n: its status and the empty path, in one message."""
     return VisibilityPlannerState(
-        status=NavigationStatus(n, outcome, reason, heading), path=_no_path(n), space=state.space
+        status=NavigationStatus(n, outcome, reason, heading),
+        path=_no_path(n),
+        space=state.space,
+        came=state.came,
     )

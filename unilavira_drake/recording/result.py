@@ -68,6 +68,9 @@ class MetricsResult:
     person_contacts: int | None = None
     """How often robot and person touched, each time one of the ``collisions``, too; None as above.
     """
+    path_type: str | None = None
+    """``easy`` or ``hard`` by the length of the shortest path, as OpenUAV has it; None on the
+    ground."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ class FlightConfig:
     # Lowest and highest centre.
     min_altitude: float = 0.4
     max_altitude: float = 2.2
-    # x_min, y_min, x_max, y_max that the centre never leaves; empty: no fence.
+    # x_min, y_min, x_max, y_max that the centre never leaves; empty: no fence.  As the wind, it is
+    # written for the world as its file says, and is mirrored with it.
     geofence: list[float] = dc.field(default_factory=list)
     # Kept free below and above the centre.
     ground_margin: float = 0.35
@@ -50,3 +51,14 @@ class FlightConfig:
     turn_degrees: float = 20.0
     rest_period: float = 2.0
     wind: WindConfig = dc.field(default_factory=WindConfig)
+
+    def within(self, *, mirrored: bool) -> "FlightConfig":
+        """Returns what holds in the world itself: in a mirrored one fence and wind are, too."""
+        if not mirrored:
+            return self
+        fence = self.geofence
+        return dc.replace(
+            self,
+            geofence=[fence[0], -fence[3], fence[2], -fence[1]] if fence else [],
+            wind=dc.replace(self.wind, direction_degrees=-self.wind.direction_degrees),
+        )

@@ -18,7 +18,8 @@ from unilavira_drake.robots.flight_path_following import follow, hold, warm_up
 class FlightController(LeafSystem):
     """Moves a setpoint along the path; its state is the setpoint before.
 
-    It follows ``path`` iff path.n >= sweep.n and the path is not empty; else the setpoint comes
+    It follows ``path`` iff path.n >= sweep.n and the path is not empty, nose ahead unless it is
+    one to go backwards; else the setpoint comes
     to rest, and turns to the heading of an active ``sweep``.  Until a pose is finite there is no
     setpoint, and after a pose that is none the setpoint comes to rest.
 
@@ -78,7 +79,8 @@ class FlightController(LeafSystem):
             if (path.n, path.version) != (n, version):
                 travelled = math.nan
             points = frozen_view(path.p_WP, np.float64)
-            *moved, travelled = follow(points, reference, p_WB, yaw, travelled, *rates).tolist()
+            way = (reference, p_WB, yaw, travelled, path.backwards)
+            *moved, travelled = follow(points, *way, *rates).tolist()
             reference = np.array(moved)
             place = np.array([path.n, path.version, travelled])
         else:

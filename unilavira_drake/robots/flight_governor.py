@@ -26,6 +26,8 @@ from unilavira_drake.robots.stopping import stoppable_speed
 
 LEASH = 1.5
 """The setpoint is never farther from the aircraft than this, metres."""
+BRAKING_SHARE = 0.8
+"""Share of the braking on which the governor counts; the rest is for what turns up late."""
 MOVING = 0.05
 """An aircraft that measures a higher speed must see its pose change, m/s."""
 
@@ -41,9 +43,9 @@ class FlightGovernor(LeafSystem):
     * An aircraft that does not know how it moves (a twist that is not finite, or a pose that stays
       the same for ``pose_timeout`` though the twist says otherwise) slows down, and the setpoint
       comes back to where it was seen last.
-    * The setpoint moves only so fast that it still stops, after v^2 / 2a and one period, before
-      the aircraft around it meets an occupied voxel.  Unknown space counts as free: no camera
-      looks up, so a climb is checked only against what was mapped before.
+    * The setpoint moves only so fast that it still stops, after v^2 / 2a and one period, with the
+      standoff left before the aircraft around it meets an occupied voxel.  Unknown space counts
+      as free: no camera looks up, so a climb is checked only against what was mapped before.
     * The aircraft may always turn on the spot.
 
     The state is the setpoint, NaN until pose and command are known and finite ever after, and when
@@ -69,7 +71,8 @@ class FlightGovernor(LeafSystem):
         radius: kept free around the setpoint in the direction of flight, metres.
         fence: (2, 3), lowest and highest x, y, z of the setpoint, metres.
         offset: time of the first update, seconds; a little after the controller's.
-        standoff: that stays free before the aircraft, for what it lags and wavers, metres.
+        standoff: that stays free before the setpoint's aircraft, metres: the true one comes to
+            rest behind it, by up to 0.15 m in still air and 0.22 m in strong gusts.
         command_timeout: seconds.
         map_timeout: seconds; longer than a mapper's period at rest.
         reply_timeout: seconds.
@@ -83,7 +86,7 @@ class FlightGovernor(LeafSystem):
         radius: float,
         fence: NDArray[np.float64],
         offset: float = 0.005,
-        standoff: float = 0.1,
+        standoff: float = 0.25,
         command_timeout: float = 0.3,
         map_timeout: float = 3.0,
         reply_timeout: float = 150.0,
@@ -157,9 +160,7 @@ class FlightGovernor(LeafSystem):
                 return False
         return True
 
-    def _lost(
-        self, context: Context, discrete_state: DiscreteValues, X_WB: NDArray[np.float64]
-    ) -> bool:
+    def _lost(self, context: Context, discrete_state: DiscreteValues, X_WB: Any) -> bool:
         """Whether nobody knows how the aircraft moves."""
         time = context.get_time()
         twist: Any = self._twist(context)
@@ -202,10 +203,10 @@ class FlightGovernor(LeafSystem):
         direction: NDArray[np.float64],
         speed: float,
     ) -> float:
-        limits = self._limits
-        stopping = speed**2 / (2.0 * limits.max_braking) + speed * limits.period
+        period, braking = self._limits.period, BRAKING_SHARE * self._limits.max_braking
+        stopping = speed**2 / (2.0 * braking) + speed * period
         horizon = stopping + self._standoff
-        reach, resolution = self._radius + map_.resolution, map_.resolution
+        reach, resolution = self._radius, map_.resolution
         bounds = voxels_ahead(p, direction, horizon, reach, resolution)
         i, j, k, *beyond = bounds.tolist()
         free = horizon
@@ -219,4 +220,4 @@ class FlightGovernor(LeafSystem):
             free = min(free, free_flight(voxels, corner, bounds, resolution, *way))
         if free >= horizon:
             return speed
-        return float(stoppable_speed(free - self._standoff, limits.max_braking, limits.period))
+        return float(stoppable_speed(free - self._standoff, braking, period))

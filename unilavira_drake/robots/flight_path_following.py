@@ -142,6 +142,7 @@ def follow(
     p_WB: NDArray[np.float64],
     yaw: float,
     travelled: float,
+    backwards: bool,
     max_yaw_acceleration: float,
     limits: FlightLimits,
 ) -> NDArray[np.float64]:
@@ -153,6 +154,7 @@ def follow(
         p_WB: (3,) where the aircraft is, metres.
         yaw: of the aircraft, radians.
         travelled: how far along this path the one before is, metres; NaN: where it is nearest.
+        backwards: whether the nose stays where it points.
         max_yaw_acceleration: rad/s^2.
         limits: of the aircraft.
     """
@@ -167,7 +169,7 @@ def follow(
     ahead, _ = advance(p_WP, segment, along, max(previous * LOOKAHEAD_TIME, MIN_LOOKAHEAD))
     way = ahead - reference[:3]
     heading = reference[3]
-    if math.hypot(way[0], way[1]) > max(0.3 * abs(way[2]), 0.05):
+    if not backwards and math.hypot(way[0], way[1]) > max(0.3 * abs(way[2]), 0.05):
         heading = math.atan2(way[1], way[0])
         off = abs(math.atan2(math.sin(heading - yaw), math.cos(heading - yaw)))
         share = (STOP_ANGLE - off) / (STOP_ANGLE - FREE_ANGLE)
@@ -203,5 +205,5 @@ def hold(
 def warm_up() -> None:
     """Compiles the kernels, or loads them from numba's cache."""
     limits, reference = FlightLimits(), np.zeros(7)
-    follow(read_only(np.zeros((2, 3))), reference, np.zeros(3), 0.0, np.nan, 1.0, limits)
+    follow(read_only(np.zeros((2, 3))), reference, np.zeros(3), 0.0, np.nan, False, 1.0, limits)
     hold(reference, 0.0, 1.0, limits)

@@ -11,6 +11,11 @@ from unilavira_drake.kernels import frozen_view, kernel
 from unilavira_drake.robots.drive_limits import approach, braking_speed
 from unilavira_drake.robots.flight_limits import FlightLimits
 
+TOUCH = 1e-3
+"""A ball touches what is nearer to it than this, metres."""
+MOST_STEPS = 32
+"""A ball that only grazes a voxel needs many steps; so many are enough to be nearly there."""
+
 
 @kernel
 def voxels_ahead(
@@ -38,6 +43,46 @@ def voxels_ahead(
 
 
 @kernel
+def way_to_voxel(
+    q: tuple[float, float, float],
+    half: float,
+    direction: NDArray[np.float64],
+    horizon: float,
+    radius: float,
+) -> float:
+    """Returns how far a ball may fly straight before it meets a cube, metres.
+
+    It goes on by what is free until it touches.  The cube is convex: once it recedes it is never
+    met, nor is one that the ball already touches and leaves.
+
+    Args:
+        q: the cube's centre as seen from the ball's, metres.
+        half: half a side of the cube, metres.
+        direction: (3,) unit vector.
+        horizon: metres; returned when the cube is not met within it.
+        radius: of the ball, metres.
+    """
+    travelled = 0.0
+    for _ in range(MOST_STEPS):
+        square, towards, centre = 0.0, 0.0, 0.0
+        for axis in range(3):
+            way = q[axis] - travelled * direction[axis]
+            gap = math.copysign(max(abs(way) - half, 0.0), way)
+            square += gap * gap
+            towards += gap * direction[axis]
+            centre += way * direction[axis]
+        if (towards if square > 0.0 else centre) <= 0.0:
+            return horizon
+        free = math.sqrt(square) - radius
+        if free < TOUCH:
+            return travelled
+        travelled += free
+        if travelled >= horizon:
+            return horizon
+    return travelled
+
+
+@kernel
 def free_flight(
     log_odds: NDArray[np.int8],
     corner: tuple[int, int, int],
@@ -50,9 +95,8 @@ def free_flight(
 ) -> float:
     """Returns how far a ball may fly straight before it meets an occupied voxel, metres.
 
-    A voxel is taken for a ball of its own half side.  What lies behind is no hindrance, nor is
-    what the ball already touches and leaves.  Unknown voxels count as free: the planner keeps to
-    what was seen.
+    What lies behind is no hindrance, nor is what the ball already touches and leaves.  Unknown
+    voxels count as free: the planner keeps to what was seen.
 
     Args:
         log_odds: int8 of some voxels; positive is occupied.
@@ -64,7 +108,6 @@ def free_flight(
         horizon: metres; returned when nothing is met within it.
         radius: of the ball, metres.
     """
-    reach = radius + 0.5 * resolution
     best = horizon
     nx, ny, nz = log_odds.shape
     for x in range(max(bounds[0] - corner[0], 0), min(bounds[3] - corner[0], nx)):
@@ -72,15 +115,12 @@ def free_flight(
             for z in range(max(bounds[2] - corner[2], 0), min(bounds[5] - corner[2], nz)):
                 if log_odds[x, y, z] <= 0:
                     continue
-                qx = (corner[0] + x + 0.5) * resolution - p[0]
-                qy = (corner[1] + y + 0.5) * resolution - p[1]
-                qz = (corner[2] + z + 0.5) * resolution - p[2]
-                ahead = qx * direction[0] + qy * direction[1] + qz * direction[2]
-                if ahead <= 0.0:
-                    continue
-                aside = qx * qx + qy * qy + qz * qz - ahead * ahead
-                if aside < reach * reach:
-                    best = min(best, max(ahead - math.sqrt(reach * reach - aside), 0.0))
+                q = (
+                    (corner[0] + x + 0.5) * resolution - p[0],
+                    (corner[1] + y + 0.5) * resolution - p[1],
+                    (corner[2] + z + 0.5) * resolution - p[2],
+                )
+                best = way_to_voxel(q, 0.5 * resolution, direction, best, radius)
     return best
 
 

@@ -51,6 +51,11 @@ class Robot:
         """Whether it can be on another floor than the one at height 0."""
         return True
 
+    @property
+    def flies(self) -> bool:
+        """Whether it is an aircraft."""
+        return True
+
 
 @dc.dataclass
 class GroundRobot(Robot):
@@ -72,6 +77,11 @@ class GroundRobot(Robot):
     def leaves_the_ground(self) -> bool:
         """Whether it can be on another floor than the one at height 0."""
         return self.can_climb
+
+    @property
+    def flies(self) -> bool:
+        """Whether it is an aircraft."""
+        return False
 
     @property
     def hold(self) -> float:

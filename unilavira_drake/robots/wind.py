@@ -24,6 +24,8 @@ class WindModel(NamedTuple):
     correlation_time: float = 2.0
     """Of the gusts, seconds."""
     seed: int = 0
+    mirrored: bool = False
+    """Whether the gusts blow as in a world whose y is negated; ``direction`` is as it says."""
 
 
 STILL_AIR = WindModel()
@@ -63,6 +65,7 @@ class Wind(LeafSystem):
         self._model = model
         self._drag = (linear_drag, quadratic_drag)
         self._period = period
+        self._sides = np.array([1.0, -1.0 if model.mirrored else 1.0, 1.0])
         steady = model.speed
         self._steady = np.array(
             [steady * math.cos(model.direction), steady * math.sin(model.direction), 0.0]
@@ -82,14 +85,14 @@ class Wind(LeafSystem):
         if model.gusts > 0.0:
             count = round(context.get_time() / self._period)
             gust = next_gust(
-                air - self._steady,
+                self._sides * (air - self._steady),
                 model.seed,
                 count,
                 self._period,
                 model.gusts,
                 model.correlation_time,
             )
-            air = self._steady + gust
+            air = self._steady + self._sides * gust
             discrete_state.set_value(self._air_index, air)
         force: Any = drag(air, self._body_state(context), *self._drag)
         discrete_state.set_value(self._force_index, force)

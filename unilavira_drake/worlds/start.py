@@ -27,7 +27,7 @@ def parse_start(text: str, world: World, *, radius: float) -> tuple[float, float
 
 
 def parse_start_pose(
-    text: str, world: World, *, radius: float, climbs: bool = True
+    text: str, world: World, *, radius: float, climbs: bool = True, flies: bool = False
 ) -> tuple[float, float, float, float]:
     """Returns x, y, height of the floor (metres) and yaw (radians) of a start.
 
@@ -41,12 +41,20 @@ def parse_start_pose(
         world: where the start must be free.
         radius: the robot's, metres; a start keeps at least this clearance.
         climbs: whether the robot can stand on another floor than the one at height 0.
+        flies: whether it is an aircraft: under a roof it takes off from the ground floor, from
+            which its altitudes are measured.
 
     Raises:
         TaskError: names the value and the remedy, for malformed text, an unknown room, a place
             outside the world, in a wall or in furniture, and a floor where it cannot stand.
     """
     x, y, floor, yaw = _parsed(text.strip(), world, radius)
+    if floor != 0.0 and flies and not world.outdoors:
+        raise TaskError(
+            f"start: {text!r} is on the floor at height {floor:g}, and an aircraft takes off from "
+            "the ground floor; choose a place there, or another robot (robot: !UnitreeGo1 "
+            "{can_climb: true})."
+        )
     if floor != 0.0 and not climbs:
         remedy = (
             "choose X,Y,YAW, or an aircraft (robot: !Quadrotor {})"
