@@ -104,7 +104,7 @@ def test_no_camera_sees_its_own_robot():
 def test_the_plant_s_steps_are_as_short_as_its_autopilot_needs():
     scenario = scenario_of()
     assert scenario.plant.time_step == 0.025
-    assert plant_config(scenario).time_step == 0.005
+    assert plant_config(scenario).time_step == 0.01
     assert plant_config(load_scenario("flat")).time_step == 0.025
 
 

@@ -51,7 +51,7 @@ class Quadrotor(Robot):
     control_period: float = 0.05
     # Of the autopilot, seconds, and the longest step of the plant in which it flies.
     autopilot_period: float = 0.01
-    max_time_step: float = 0.005
+    max_time_step: float = 0.01
     # Wind moves it a little where it hovers.
     rest_speed: float = 0.2
     rest_rate: float = 0.1
