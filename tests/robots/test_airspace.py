@@ -49,7 +49,7 @@ def test_a_start_in_a_mirrored_world_is_seen_within_the_mirrored_fence():
     for mirror in ("false", "true"):
         world = f"world: {{name: town, mirror: {mirror}}}"
         load_scenario("town", f"{world}\nflight: {{geofence: [100, 200, 300, 380]}}\n{task}")
-        with pytest.raises(TaskError, match="outside flight.geofence"):
+        with pytest.raises(TaskError, match=r"outside flight\.geofence"):
             load_scenario("town", f"{world}\nflight: {{geofence: [100, 0, 300, 200]}}\n{task}")
 
 

@@ -68,6 +68,67 @@ def specific_thrust(
 
 
 @kernel
+def _thrust_wanted(
+    memory: NDArray[np.float64],
+    p_WB: NDArray[np.float64],
+    v_WB: NDArray[np.float64],
+    setpoint: NDArray[np.float64],
+    period: float,
+    airframe: Airframe,
+    gains: AutopilotGains,
+) -> NDArray[np.float64]:
+    """The loops of position (P) and velocity (PID): thrust by mass in the world, m/s^2; (3,)."""
+    integral = memory[0:3]
+    error = velocity_setpoint(p_WB, setpoint, gains) - v_WB
+    # What the moving setpoint gains in speed is not left to the error.
+    ahead = (setpoint[4:7] - memory[19:22]) / gains.lead_time
+    memory[19:22] += min(period, gains.lead_time) * ahead
+    wish = gains.velocity_p * error + integral - gains.velocity_d * memory[6:9] + ahead
+    f = specific_thrust(wish, airframe, gains)
+    for i in range(3):
+        # What could not be had is taken back from the error, as PX4 does.
+        got = f[i] - (GRAVITY if i == 2 else 0.0)
+        left = error[i] - (wish[i] - got) / gains.velocity_p
+        if left * error[i] < 0.0:
+            left = 0.0
+        value = integral[i] + gains.velocity_i * left * period
+        integral[i] = min(max(value, -WINDUP), WINDUP)
+    return f
+
+
+@kernel
+def _rate_wanted(
+    R_WB: NDArray[np.float64], f: NDArray[np.float64], yaw: float, gains: AutopilotGains
+) -> NDArray[np.float64]:
+    """The loop of attitude (P): body rate towards a thrust and a yaw, rad/s; (3,)."""
+    wanted = attitude_of(f / math.sqrt(np.sum(f * f)), yaw)
+    rate = gains.attitude * attitude_error(quaternion_of(R_WB), wanted, gains.yaw_weight)
+    for i in range(3):
+        bound = gains.max_yaw_rate if i == 2 else gains.max_rate
+        rate[i] = min(max(rate[i], -bound), bound)
+    return rate
+
+
+@kernel
+def _torque_wanted(
+    memory: NDArray[np.float64],
+    rate_error: NDArray[np.float64],
+    w_WB_B: NDArray[np.float64],
+    airframe: Airframe,
+    gains: AutopilotGains,
+) -> NDArray[np.float64]:
+    """The loop of rate (PID), without its integral's step: torque in the body frame, N m; (3,)."""
+    angular = gains.rate_p * rate_error + memory[3:6] - gains.rate_d * memory[9:12]
+    inertia = np.array([airframe.inertia_x, airframe.inertia_y, airframe.inertia_z])
+    spin = inertia * w_WB_B
+    torque = inertia * angular
+    torque[0] += w_WB_B[1] * spin[2] - w_WB_B[2] * spin[1]
+    torque[1] += w_WB_B[2] * spin[0] - w_WB_B[0] * spin[2]
+    torque[2] += w_WB_B[0] * spin[1] - w_WB_B[1] * spin[0]
+    return torque
+
+
+@kernel
 def fly(
     memory: NDArray[np.float64],
     R_WB: NDArray[np.float64],
@@ -94,48 +155,18 @@ def fly(
         gains: of the cascade.
         rotors: (4,) thrust of each rotor.
     """
-    velocity_integral, rate_integral = memory[0:3], memory[3:6]
     _derive(memory, v_WB, w_WB_B, period, gains)
-    # Velocity PID.
-    error = velocity_setpoint(p_WB, setpoint, gains) - v_WB
-    # What the moving setpoint gains in speed is not left to the error.
-    ahead = (setpoint[4:7] - memory[19:22]) / gains.lead_time
-    memory[19:22] += min(period, gains.lead_time) * ahead
-    wish = gains.velocity_p * error + velocity_integral - gains.velocity_d * memory[6:9] + ahead
-    f = specific_thrust(wish, airframe, gains)
-    for i in range(3):
-        # What could not be had is taken back from the error, as PX4 does.
-        got = f[i] - (GRAVITY if i == 2 else 0.0)
-        left = error[i] - (wish[i] - got) / gains.velocity_p
-        if left * error[i] < 0.0:
-            left = 0.0
-        value = velocity_integral[i] + gains.velocity_i * left * period
-        velocity_integral[i] = min(max(value, -WINDUP), WINDUP)
-    # Attitude P.
-    magnitude = math.sqrt(np.sum(f * f))
-    q = quaternion_of(R_WB)
-    turn = attitude_error(q, attitude_of(f / magnitude, setpoint[3]), gains.yaw_weight)
-    rate = gains.attitude * turn
-    for i in range(3):
-        bound = gains.max_yaw_rate if i == 2 else gains.max_rate
-        rate[i] = min(max(rate[i], -bound), bound)
-    # Rate PID.
-    rate_error = rate - w_WB_B
-    angular = gains.rate_p * rate_error + rate_integral - gains.rate_d * memory[9:12]
-    inertia = np.array([airframe.inertia_x, airframe.inertia_y, airframe.inertia_z])
-    spin = inertia * w_WB_B
-    torque = inertia * angular
-    torque[0] += w_WB_B[1] * spin[2] - w_WB_B[2] * spin[1]
-    torque[1] += w_WB_B[2] * spin[0] - w_WB_B[0] * spin[2]
-    torque[2] += w_WB_B[0] * spin[1] - w_WB_B[1] * spin[0]
+    f = _thrust_wanted(memory, p_WB, v_WB, setpoint, period, airframe, gains)
+    rate_error = _rate_wanted(R_WB, f, setpoint[3], gains) - w_WB_B
+    torque = _torque_wanted(memory, rate_error, w_WB_B, airframe, gains)
     # Thrust along the body's z axis as it is, not as it should be.
-    thrust = airframe.mass * max(np.sum(f * R_WB[:, 2]), 0.3 * magnitude)
+    thrust = airframe.mass * max(np.sum(f * R_WB[:, 2]), 0.3 * math.sqrt(np.sum(f * f)))
     level_cut, yaw_cut = mix(thrust, torque, airframe, rotors)
     for i in range(3):
         if not (yaw_cut if i == 2 else level_cut):
-            value = rate_integral[i] + gains.rate_i * rate_error[i] * period
+            value = memory[3 + i] + gains.rate_i * rate_error[i] * period
             bound = 0.5 * gains.rate_p
-            rate_integral[i] = min(max(value, -bound), bound)
+            memory[3 + i] = min(max(value, -bound), bound)
 
 
 @kernel
