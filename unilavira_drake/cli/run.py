@@ -128,7 +128,7 @@ def run_watched(scenario: Scenario, out: Path) -> None:
             result = run_episode(scenario, out=out, on_event=progress.record)
     except KeyboardInterrupt:
         raise typer.Exit(INTERRUPTED) from None
-    print_summary(result, out, progress.console)
+    print_summary(result, scenario, out, progress.console)
     if result.cause == UNREACHABLE:
         raise InfrastructureError(result.error)
     if result.cause == UNCOUNTED:
