@@ -93,6 +93,15 @@ def test_an_answer_is_no_markup_and_no_command_to_the_terminal(answer: str) -> N
     assert row(printed(dataclasses.replace(ANSWERED, metrics=metrics)), "answer") == shown
 
 
+def test_people_are_told_of_where_there_are_some() -> None:
+    assert "people" not in printed(ANSWERED)
+    among = dataclasses.replace(
+        ANSWERED, metrics=MetricsResult(person_contacts=2, person_min_distance_m=0.104)
+    )
+    assert row(printed(among), "contacts with people") == "2"
+    assert row(printed(among), "nearest to a person") == "0.10 m"
+
+
 @pytest.mark.parametrize("name", ["flat", "town", "two_storey", "apartment_eqa"])
 def test_what_to_try_next_is_another_task_of_the_same_scenario(name: str) -> None:
     scenario = load_scenario(name)

@@ -76,6 +76,9 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
         ("backtracks", str(counts.backtracks)),
         ("simulated time", f"{result.time.simulated_s:.1f} s"),
     ]
+    if metrics.person_contacts is not None:
+        rows.append(("contacts with people", str(metrics.person_contacts)))
+        rows.append(("nearest to a person", _metres(metrics.person_min_distance_m)))
     if metrics.answer is not None:
         rows.append(("answer", metrics.answer))
     if metrics.answer_correct is not None:
