@@ -95,6 +95,8 @@ class Drive:
     reason: str
     penetration: float
     """Deepest overlap with a wall, metres."""
+    backed_off: bool
+    """Whether it was stuck on the way and backed off."""
     crossed: bool
     """Whether the base's centre crossed the wall beside the door."""
     contact: float
@@ -188,6 +190,7 @@ def _watched(
     root = simulator.get_context()
     inside, at = station.GetMyContextFromRoot(root), navigation.GetMyContextFromRoot(root)
     errors, deepest, force, crossed, before = [], 0.0, 0.0, False, 0.0
+    backed_off = False
     cpu = time.process_time()
     while True:
         simulator.AdvanceTo(root.get_time() + 0.1)
@@ -200,6 +203,7 @@ def _watched(
         crossed |= before * x < 0.0 and abs(y - door) > width / 2
         before = x
         path = navigation.GetOutputPort("path").Eval(at)
+        backed_off |= path.backwards
         status = navigation.GetOutputPort("navigation_status").Eval(at)
         twist = station.GetOutputPort("twist").Eval(inside)
         if len(path.p_WP) and math.hypot(*twist[3:5]) > 0.02:
@@ -210,6 +214,7 @@ def _watched(
                 state=status.state if done else "failed",
                 reason=status.reason if done else "time",
                 penetration=deepest,
+                backed_off=backed_off,
                 crossed=crossed,
                 contact=force,
                 errors=np.array(errors),

@@ -96,6 +96,7 @@ def doors(name: str, robot: GroundRobot, count: int) -> None:
         sense="<=",
         seeds=stuck,
         touching=sum(drive.contact > 1.0 for drive in drives),
+        backed_off=sum(drive.backed_off for drive in drives),
         simulated_s=round(sum(drive.simulated for drive in drives), 1),
         cpu_s=round(sum(drive.cpu for drive in drives), 1),
     )

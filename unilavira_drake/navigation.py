@@ -129,9 +129,15 @@ def _make_ground_navigation(
     return wiring.build("navigation")
 
 
+def _time_to_turn_about(robot: GroundRobot) -> float:
+    """For how long a base that turns to a path behind it makes no way, seconds."""
+    rate = robot.max_yaw_rate
+    return math.pi / rate + rate / robot.max_yaw_acceleration + robot.hold
+
+
 def _add_mapper_and_planner(
     wiring: Wiring,
-    robot: Robot,
+    robot: GroundRobot,
     intrinsics: Intrinsics,
     mapping: MappingConfig,
     planning: PlanningConfig,
@@ -163,8 +169,7 @@ def _add_mapper_and_planner(
             turning_radius=robot.turning_radius,
             snap_distance=planning.snap_distance,
             tolerance=planning.tolerance,
-            # A slow base makes no way while it turns about.
-            stuck_time=max(planning.stuck_time, 2.0 * math.pi / robot.max_yaw_rate),
+            stuck_time=max(planning.stuck_time, 2.0 * _time_to_turn_about(robot)),
             travel_factor=planning.travel_factor,
             patience=planning.patience,
             can_climb=robot.can_climb,

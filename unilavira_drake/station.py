@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Diagram, DiagramBuilder, System
 
-from unilavira_drake.errors import ScenarioError
 from unilavira_drake.people.adding import connect_people
 from unilavira_drake.people.bodies import add_people
 from unilavira_drake.people.crowd import Person, make_crowd, with_people
 from unilavira_drake.raster import raster_works
-from unilavira_drake.resources import package_xml
 from unilavira_drake.robots.actuation import add_actuation, set_start
 from unilavira_drake.robots.planar_base import HEIGHT_JOINT
 from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.robots.quadrotor_actuation import add_landing_ground
-from unilavira_drake.robots.robot import Robot
-from unilavira_drake.robots.terrain import climbing_model, follow_terrain
+from unilavira_drake.robots.robot_model import add_robot_model
+from unilavira_drake.robots.terrain import follow_terrain
 from unilavira_drake.robots.wind import WindModel
 from unilavira_drake.scenario import Scenario, plant_config
 from unilavira_drake.sensors.rig import add_renderer
@@ -57,7 +53,7 @@ def add_navigation_station(
         X_WB_start: where the robot starts; the chosen task's start when None.
 
     Raises:
-        ScenarioError: if the world's file cannot be used.
+        ScenarioError: if the world's file or the robot's model cannot be used.
         TaskError: if the start cannot be used.
     """
     start, height = None, 0.0
@@ -109,7 +105,7 @@ def make_navigation_station(
         locomotion: a System in the place of the robot's own, see ``add_actuation``.
 
     Raises:
-        ScenarioError: if the world's file cannot be used.
+        ScenarioError: if the world's file or the robot's model cannot be used.
         TaskError: if the start cannot be used.
     """
     if world is None:
@@ -180,7 +176,7 @@ def _add_scene(
 ) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
     plant, scene_graph = AddMultibodyPlant(plant_config(scenario), builder)
     ground = add_scenery(plant, scene_graph, world)
-    model_instance = _add_robot(plant, scenario.robot)
+    model_instance = add_robot_model(plant, scenario.robot)
     if isinstance(scenario.robot, Quadrotor):
         add_landing_ground(plant)
     add_people(plant, scene_graph, people)
@@ -188,21 +184,6 @@ def _add_scene(
         follow_terrain(plant, scene_graph, model_instance, ground)
     plant.Finalize()
     return plant, scene_graph, model_instance
-
-
-def _add_robot(plant: MultibodyPlant, robot: Robot) -> ModelInstanceIndex:
-    model = robot.model or f"package://unilavira_drake/robots/{robot.name}.sdf"
-    parser = Parser(plant)
-    parser.package_map().AddPackageXml(package_xml())
-    known = "://" in model
-    path = Path(parser.package_map().ResolveUrl(model) if known else model)
-    if not path.is_file():
-        raise ScenarioError(f"robot.model: no file {model!r}; check the path.")
-    if robot.can_climb:
-        (model_instance,) = parser.AddModelsFromString(climbing_model(path), "sdf")
-    else:
-        (model_instance,) = parser.AddModelsFromUrl(model) if known else parser.AddModels(path)
-    return model_instance
 
 
 def _picture_scene(scenario: Scenario, world: World, people: tuple[Person, ...]) -> Diagram:

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import shlex
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
-from unilavira_drake.cli.summary import print_summary
+from unilavira_drake.cli.summary import next_commands, print_summary
 from unilavira_drake.mllm.reply import Usage
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.recording.result import (
     EpisodeResult,
     JudgeResult,
     MetricsResult,
+    ModelResult,
+    TaskResult,
     UsageResult,
 )
+from unilavira_drake.scenario import NamedTask, Scenario
+from unilavira_drake.scenario_loading import load_scenario
 
 LANGUAGE = ModelUsage(1, 0, 1, Usage(900, 90, 12, 0.25))
 UNPRICED = ModelUsage(1, 0, 1, Usage(900, 90, 12, None))
@@ -34,7 +39,7 @@ ANSWERED = EpisodeResult(
 
 def printed(result: EpisodeResult) -> str:
     stream = io.StringIO()
-    print_summary(result, Path("out"), Console(file=stream, width=200))
+    print_summary(result, Scenario(), Path("out"), Console(file=stream, width=200))
     return stream.getvalue()
 
 
@@ -92,3 +97,43 @@ def test_only_a_flight_has_a_path_type() -> None:
     flown = dataclasses.replace(ANSWERED, metrics=MetricsResult(path_type="hard"))
     assert row(printed(flown), "path type") == "hard"
     assert "path type" not in printed(ANSWERED)
+
+
+def test_people_are_told_of_where_there_are_some() -> None:
+    assert "people" not in printed(ANSWERED)
+    among = dataclasses.replace(
+        ANSWERED, metrics=MetricsResult(person_contacts=2, person_min_distance_m=0.104)
+    )
+    assert row(printed(among), "contacts with people") == "2"
+    assert row(printed(among), "nearest to a person") == "0.10 m"
+
+
+@pytest.mark.parametrize("name", ["flat", "town", "two_storey", "apartment_eqa"])
+def test_what_to_try_next_is_another_task_of_the_same_scenario(name: str) -> None:
+    scenario = load_scenario(name)
+    for done in [*scenario.tasks, ""]:
+        result = EpisodeResult(
+            task=TaskResult(name=done), model=ModelResult(reasoning="rules"), scenario=name
+        )
+        words = shlex.split(next_commands(result, scenario, Path("a run"))[2])
+        assert words[:4] == ["unilavira", "run", "--scenario", "a run/scenario.yaml"]
+        assert words[4] == "--task"
+        task = words[5].removeprefix("@")
+        assert task != done
+        assert task in scenario.tasks
+        assert words[6:] == []
+
+
+def test_what_to_try_next_costs_no_money() -> None:
+    result = EpisodeResult(model=ModelResult(reasoning="model"))
+    scenario = Scenario(tasks={"a": NamedTask()})
+    assert next_commands(result, scenario, Path("out"))[1:] == (
+        "unilavira run --scenario out/scenario.yaml --model rules",
+        "unilavira run --scenario out/scenario.yaml --task @a --model rules",
+    )
+
+
+def test_without_another_task_the_scenarios_are_listed() -> None:
+    result = EpisodeResult(task=TaskResult(name="a"))
+    scenario = Scenario(tasks={"a": NamedTask()})
+    assert next_commands(result, scenario, Path("out"))[2] == "unilavira scenarios"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -47,3 +48,19 @@ def test_a_wall_without_a_door_is_told(drives: Any) -> None:
     drive = drives.drive(robot, start=(-2.0, 0.0, 0.0), goal=(2.0, 0.0), door=0.0, width=0.3)
     assert drive.state == "failed"
     assert not drive.crossed
+
+
+@pytest.mark.parametrize(
+    ("name", "slow"),
+    [
+        ("cobot_magic", {"max_yaw_acceleration": 0.2}),
+        ("unitree_g1", {"control_period": 2.0, "command_period": 2.0, "max_yaw_rate": 0.8}),
+    ],
+)
+def test_a_slow_turn_to_a_path_behind_it_is_not_being_stuck(
+    drives: Any, name: str, slow: dict[str, float]
+) -> None:
+    robot = robot_kinds()[name](**slow)
+    width = 1.6 * robot.width
+    drive = drives.drive(robot, start=(-2.5, 0.0, math.pi), goal=(1.5, 0.0), door=0.0, width=width)
+    assert (drive.state, drive.backed_off) == ("arrived", False)

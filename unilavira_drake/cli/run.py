@@ -19,7 +19,7 @@ from unilavira_drake.mllm.backends import SPECS, make_backend
 from unilavira_drake.mllm.judges import make_judge
 from unilavira_drake.recording.run_folder import fresh_folder
 from unilavira_drake.rendering_check import check_rendering
-from unilavira_drake.scenario import Scenario
+from unilavira_drake.scenario import Scenario, robot_kinds
 from unilavira_drake.scenario_loading import load_scenario, overlay_from_settings, robot_setting
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.tasks import checked_task
@@ -43,7 +43,9 @@ def run(
     scenario: Annotated[
         str, _option("Name or file; default: apartment.", "NAME|FILE.yaml")
     ] = "apartment",
-    robot: Annotated[str | None, _option("Robot.", "NAME")] = None,
+    robot: Annotated[
+        str | None, _option(f"Robot: {', '.join(sorted(robot_kinds()))}.", "NAME")
+    ] = None,
     model: Annotated[str | None, _option(f"Both models. SPEC: {SPECS}.", "SPEC")] = None,
     language_model: Annotated[str | None, _option("The language model.", "SPEC")] = None,
     vision_model: Annotated[str | None, _option("The vision model.", "SPEC")] = None,
@@ -128,7 +130,7 @@ def run_watched(scenario: Scenario, out: Path) -> None:
             result = run_episode(scenario, out=out, on_event=progress.record)
     except KeyboardInterrupt:
         raise typer.Exit(INTERRUPTED) from None
-    print_summary(result, out, progress.console)
+    print_summary(result, scenario, out, progress.console)
     if result.cause == UNREACHABLE:
         raise InfrastructureError(result.error)
     if result.cause == UNCOUNTED:

@@ -12,12 +12,13 @@ from rich.text import Text
 from unilavira_drake.messages.metrics import CAUSES
 from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.report.figures import cost_figures, judge_figures
+from unilavira_drake.scenario import Scenario
 
 _YES_NO = {True: "yes", False: "no", None: "-"}
 _VERDICTS = {True: "success", False: "no success", None: "not scored"}
 
 
-def print_summary(result: EpisodeResult, out: Path, console: Console) -> None:
+def print_summary(result: EpisodeResult, scenario: Scenario, out: Path, console: Console) -> None:
     """Prints how an episode ended, its figures, its folder and three commands to try next."""
     style = {True: "bold green", False: "bold red", None: "bold"}[result.success]
     console.print(f"\n{_VERDICTS[result.success]}: {result.cause}", style=style, markup=False)
@@ -29,22 +30,30 @@ def print_summary(result: EpisodeResult, out: Path, console: Console) -> None:
     console.print(table)
     console.print(f"run folder: {out}", markup=False, soft_wrap=True)
     console.print("next, try:", markup=False)
-    for command in next_commands(result, out):
+    for command in next_commands(result, scenario, out):
         console.print(f"  {command}", markup=False, soft_wrap=True)
 
 
-def next_commands(result: EpisodeResult, out: Path) -> tuple[str, str, str]:
-    """Returns three commands that a person would try after this episode."""
+def next_commands(result: EpisodeResult, scenario: Scenario, out: Path) -> tuple[str, str, str]:
+    """Returns three commands that a person would try after this episode of a scenario."""
     again = f"unilavira run --scenario {shlex.quote(str(out / 'scenario.yaml'))}"
-    other = f"--ablation {'no_tdm' if result.ablation == 'full' else 'full'}"
-    if result.model.reasoning != "rules":
-        # A cassette has no replies to other prompts, and a real model costs money.
-        other = "--model rules"
+    # A cassette has no replies to other prompts, and a real model costs money.
+    rules = "" if result.model.reasoning == "rules" else " --model rules"
+    other = rules or f" --ablation {'no_tdm' if result.ablation == 'full' else 'full'}"
+    task = _next_task(scenario, result.task.name)
     return (
         f"unilavira report {shlex.quote(str(out))}",
-        f"{again} {other}",
-        'unilavira run --start bedroom --task "Go to the kitchen and stop at the refrigerator."',
+        f"{again}{other}",
+        f"{again} --task {shlex.quote('@' + task)}{rules}" if task else "unilavira scenarios",
     )
+
+
+def _next_task(scenario: Scenario, name: str) -> str:
+    """The named task after this one, the first after the last; empty where there is no other."""
+    names = list(scenario.tasks)
+    after = names[names.index(name) + 1 :] if name in names else []
+    others = [*after, *(other for other in names if other != name)]
+    return others[0] if others else ""
 
 
 def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
@@ -68,6 +77,9 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
         ("backtracks", str(counts.backtracks)),
         ("simulated time", f"{result.time.simulated_s:.1f} s"),
     ]
+    if metrics.person_contacts is not None:
+        rows.append(("contacts with people", str(metrics.person_contacts)))
+        rows.append(("nearest to a person", _metres(metrics.person_min_distance_m)))
     if metrics.answer is not None:
         rows.append(("answer", metrics.answer))
     if metrics.answer_correct is not None:

@@ -36,7 +36,7 @@ def decide_flight(situation: FlightSituation) -> dict[str, Any]:
         move = _allowed(next_move(situation, progress), situation)
         updates += _turns_taken(progress, move)
     else:
-        move = Move({"tool": "double_check"}, "every leg is flown: check and stop.")
+        move = Move({"tool": "double_check"}, "every leg is flown: check and stop")
         updates += [{"op": "remove", "index": step.index} for step in progress.pending]
     return {
         "progress_analysis": _analysis(situation, progress),
