@@ -10,7 +10,8 @@ from drive import Drive
 from pydrake.systems.analysis import Simulator
 
 ALONG = {"start": (3.0, 5.7, 0.0), "goal": (11.0, 5.7)}
-SLOWLY = {"waypoints": ["7.6,4.2", "7.6,6.0"], "speed": 0.5, "pause": 3.0, "delay": 2.5}
+# They rest until the robot has passed: nothing helps against who walks into its side.
+SLOWLY = {"waypoints": ["7.6,4.2", "7.6,6.0"], "speed": 0.5, "pause": 9.0, "delay": 2.5}
 CROSSING = {"waypoints": ["7.6,4.2", "6.5,7.6"], "speed": 1.0, "pause": 3.0, "delay": 2.0}
 
 

@@ -104,24 +104,56 @@ def test_a_robot_beside_or_behind_holds_nobody():
         assert walk.pose[0] > 1.5
 
 
-def test_polite_people_let_a_robot_pass_that_would_cross_their_way():
-    walk = Walk()
-    # It comes from the right and will be on the way when the person is.
-    robot = RobotSeen(2.0, -3.0, math.pi / 2, 0.35, 0.28, 0.0, 0.8)
-    distances = []
-    for _ in range(round(8.0 / PERIOD)):
+def meet(robot, seconds, *, person=PERSON, manners=None):
+    """Lets a person and a robot that drives straight on go their ways; returns the least gap."""
+    walk = Walk(person, manners)
+    gaps = []
+    for _ in range(round(seconds / PERIOD)):
         walk.walker, wish = next_step(
-            PERSON, walk.walker, walk.manners, time=walk.time, period=PERIOD, pose=walk.pose,
+            walk.person, walk.walker, walk.manners, time=walk.time, period=PERIOD, pose=walk.pose,
             moving=walk.moving, robot=robot,
         )  # fmt: skip
         x, y, yaw = walk.pose
         walk.moving = math.hypot(wish.vx, wish.vy)
         walk.pose = (x + wish.vx * PERIOD, y + wish.vy * PERIOD, yaw + wish.yaw_rate * PERIOD)
         walk.time += PERIOD
-        robot = dataclasses.replace(robot, y=robot.y + robot.vy * PERIOD)
-        distances.append(math.hypot(*robot.nearest(*walk.pose[:2])) - RADIUS)
-    assert min(distances) > 0.1
+        x, y = robot.x + robot.vx * PERIOD, robot.y + robot.vy * PERIOD
+        robot = dataclasses.replace(robot, x=x, y=y)
+        gaps.append(math.hypot(*robot.nearest(*walk.pose[:2])) - RADIUS)
+    return min(gaps), walk
+
+
+def test_polite_people_let_a_robot_pass_that_would_cross_their_way():
+    walk = Walk()
+    # It comes from the right and will be on the way when the person is.
+    robot = RobotSeen(2.0, -3.0, math.pi / 2, 0.35, 0.28, 0.0, 0.8)
+    gap, walk = meet(robot, 8.0)
+    assert gap > 0.1
     assert walk.pose[0] > 3.0
+
+
+@pytest.mark.parametrize(("polite", "touched"), [(True, False), (False, True)])
+def test_polite_people_give_way_along_their_walk_to_a_robot_that_does_not_see_them(polite, touched):
+    # They rest where the walk begins, and it would brush against them.
+    resting = dataclasses.replace(PERSON, delay=99.0)
+    robot = RobotSeen(-0.45, -3.0, math.pi / 2, 0.35, 0.28, 0.0, 0.8)
+    gap, walk = meet(robot, 8.0, person=resting, manners=Manners(polite=polite))
+    assert (gap < 0.0) == touched
+    # No farther than it takes, and there they rest on.
+    assert walk.pose[0] < 0.5
+    assert walk.moving == 0.0
+
+
+def test_nobody_walks_along_close_beside_a_robot_that_drives():
+    ways = []
+    for speed in (0.5, 0.0):
+        robot = RobotSeen(1.0, 0.75, 0.0, 0.35, 0.28, speed, 0.0)
+        person = dataclasses.replace(PERSON, walk=((1.0, 0.0), (100.0, 0.0)))
+        walk = Walk(person)
+        walk.pose = (1.0, 0.0, 0.0)
+        ways.append(walk.go(PERIOD, robot=dataclasses.astuple(robot))[0])
+    assert ways[0] == 1.0
+    assert ways[1] > 1.0
 
 
 def test_nobody_walks_into_what_a_standing_robot_sweeps_when_it_turns():

@@ -1,79 +1,168 @@
-"""Things whose pixels are known to move: kept out of the map, but for a few seconds."""
+"""Things whose pixels are known to move: kept out of the map, and remembered beside it.
+
+The map forgets a newcomer within seconds, as it must where nobody can tell a person from a wall.
+Who is known by their pixels is remembered apart from it: where they were last seen, until their
+place is seen without them, they are seen elsewhere, or a time has passed.  A robot that drives past
+somebody who stands sees them no more, and must not forget them while it is beside them.
+"""
 
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from unilavira_drake.mapping.depth_view import DepthView
+from unilavira_drake.mapping.depth_view import DepthView, fault_of
 from unilavira_drake.mapping.occupancy import MappingParameters
-from unilavira_drake.messages import OccupancyMap
-from unilavira_drake.messages.cell_tiles import TILE, Key
+from unilavira_drake.messages import Message, read_only
 
 LABELS = 32768
 """Render labels are below this."""
+BODY = 0.25
+"""Radius of a thing about its middle, of a person with arms, metres."""
+BEHIND = 0.10
+"""Its middle lies so far behind what is seen of it, metres."""
+BESIDE, STOOD = 1.5, 20.0
+"""Who is no farther from the robot than this, metres, and was not seen to walk, is remembered for
+so long, seconds: a robot that drives sees who is farther, but not who is beside it."""
+ELSEWHERE = 4.0
+"""All others are remembered for so long, seconds."""
+STRAY, STILL = 0.15, 0.5
+"""Who leaves a place by more than these metres walks, until they stay for so many seconds."""
+LONGEST_GAP = 1.6
+"""Nobody knows what somebody did between looks farther apart than this, seconds."""
+HEIGHTS = (0.6, 0.9, 1.2)
+"""A place is seen empty where the camera looks past it at one of these, metres above the floor,"""
+PAST = 0.30
+"""and farther than its middle by this, metres."""
+
+Point = tuple[float, float]
+Cells = NDArray[np.int64]
 
 
-def wanted(labels: Sequence[int]) -> NDArray[np.bool_]:
-    """Returns a (32768,) table that is true for these labels."""
-    table = np.zeros(LABELS, np.bool_)
-    table[list(labels)] = True
+@dc.dataclass(frozen=True, eq=False)
+class Look(Message):
+    """A depth view, and what moves in it."""
+
+    view: DepthView
+    labels: NDArray[np.int16]
+    """(H, W) int16: whose pixel it is of the things that move, 0 of all else."""
+    time: float
+    """Seconds."""
+
+
+@dc.dataclass(frozen=True, eq=False)
+class MovingThing(Message):
+    """Something that is known to move, as it was last seen."""
+
+    label: int
+    position: Point
+    """Of its middle in the world, metres."""
+    cells: Cells
+    """(k, 2) rows and columns, counted from the world's origin, over which it was seen."""
+    floor_height: float
+    """z of the floor on which the robot was, metres."""
+    time: float
+    """When it was seen, seconds."""
+    anchor: Point
+    """Where it stays or was last seen to leave, metres, ..."""
+    since: float
+    """... and since when, seconds."""
+    walks: bool = False
+
+    def forgotten(self, robot: Point, time: float) -> bool:
+        """Whether it was seen too long ago for where the robot is."""
+        stands_beside = not self.walks and math.dist(self.position, robot) <= BESIDE
+        return time - self.time > (STOOD if stands_beside else ELSEWHERE)
+
+
+@dc.dataclass(frozen=True, eq=False)
+class _Sighting:
+    label: int
+    pixels: int
+    position: Point
+    cells: Cells
+    cut: bool
+    """Whether the border of the view cuts it off."""
+    time: float
+
+
+def wanted(labels: Sequence[int]) -> NDArray[np.int16]:
+    """Returns a (32768,) table that is the label itself for these labels and 0 for others."""
+    table = np.zeros(LABELS, np.int16)
+    table[list(labels)] = list(labels)
     return table
 
 
-def without(view: DepthView, moves: NDArray[np.bool_]) -> DepthView:
-    """Returns a view that says nothing where things move: no reading, neither free nor occupied.
-
-    Args:
-        view: what the camera measured.
-        moves: (H, W) bool.
-    """
-    return dc.replace(view, depth=np.where(moves, np.float32(0.0), view.depth))
+def without(look: Look) -> DepthView:
+    """Returns a view that says nothing where things move: no reading, neither free nor occupied."""
+    if not look.labels.any():
+        return look.view
+    depth = np.where(look.labels != 0, np.float32(0.0), look.view.depth)
+    return dc.replace(look.view, depth=depth)
 
 
-def with_moving(
-    occupancy: OccupancyMap,
-    views: Sequence[tuple[DepthView, NDArray[np.bool_]]],
+def remembered(
+    things: Iterable[MovingThing],
+    looks: Sequence[Look],
     parameters: MappingParameters,
+    *,
+    robot: Point,
     floor_height: float,
-) -> OccupancyMap:
-    """Returns the map with the moving things of these views as newcomers.
+    time: float,
+) -> tuple[MovingThing, ...]:
+    """Returns the things that are known after these looks, in the order of their labels.
 
     Args:
-        occupancy: integrated from what these views say of the rest.
-        views: each with (H, W) bool, where things move.
-        parameters: of the map; ``newest`` above 0.
-        floor_height: z of the floor in the world, metres.
+        things: known before.
+        looks: any number; those that make no sense are left out.
+        parameters: of the map.
+        robot: (x, y) of the robot, metres.
+        floor_height: z of the floor under the robot in the world, metres.
+        time: seconds.
     """
-    cells = [_cells(view, moves, parameters, floor_height) for view, moves in views]
-    places = np.unique(np.concatenate([*cells, np.zeros((0, 2), np.int64)]), axis=0)
-    tiles: dict[Key, NDArray[np.int8]] = {}
-    for row, column in places.tolist():
-        key = row // TILE, column // TILE
-        if key not in tiles:
-            old = occupancy.cells.tiles.get(key)
-            tiles[key] = np.zeros((TILE, TILE), np.int8) if old is None else old.copy()
-        i, j = row % TILE, column % TILE
-        if tiles[key][i, j] <= parameters.newest:
-            tiles[key][i, j] = parameters.newest
-    if not tiles:
-        return occupancy
-    for tile in tiles.values():
-        tile.flags.writeable = False
-    grid = occupancy.cells
-    return dc.replace(occupancy, cells=grid.updated(tiles, first=grid.first, shape=grid.shape))
+    believed = [look for look in looks if not fault_of(look.view)]
+    old = {thing.label: thing for thing in things}
+    best: dict[int, _Sighting] = {}
+    for look in believed:
+        for sighting in _sightings(look, parameters, floor_height):
+            known = best.get(sighting.label)
+            if known is None or sighting.pixels >= known.pixels:
+                best[sighting.label] = sighting
+    new = {
+        label: thing
+        for label, thing in old.items()
+        if label not in best
+        and not thing.forgotten(robot, time)
+        and not any(_seen_past(look, thing, parameters) for look in believed)
+    }
+    for label, sighting in best.items():
+        # Who is out of range is at least not where they were.
+        if len(sighting.cells):
+            new[label] = _followed(old.get(label), sighting, floor_height)
+    return tuple(new[label] for label in sorted(new))
 
 
-def _cells(
-    view: DepthView, moves: NDArray[np.bool_], own: MappingParameters, floor_height: float
-) -> NDArray[np.int64]:
-    """Returns the (k, 2) cells (row, column) over which things that move are seen."""
-    step = own.stride
-    depth = view.depth[::step, ::step]
-    v, u = np.nonzero(moves[::step, ::step] & np.isfinite(depth) & (depth > 0.0))
+def cells_around(x: float, y: float, radius: float, resolution: float) -> Cells:
+    """Returns the (k, 2) cells (row, column) whose centres lie within a radius of a point."""
+    first_row, first_column = (math.floor((c - radius) / resolution) for c in (y, x))
+    size = math.ceil(2.0 * radius / resolution) + 2
+    rows, columns = np.mgrid[first_row : first_row + size, first_column : first_column + size]
+    away = np.hypot((rows + 0.5) * resolution - y, (columns + 0.5) * resolution - x)
+    near = away <= radius
+    return np.stack((rows[near], columns[near]), axis=1)
+
+
+def _sightings(look: Look, own: MappingParameters, floor_height: float) -> list[_Sighting]:
+    """Returns what is seen of the things that move."""
+    step, view = own.stride, look.view
+    depth, labels = view.depth[::step, ::step], look.labels[::step, ::step]
+    v, u = np.nonzero((labels != 0) & np.isfinite(depth) & (depth > 0.0))
+    if not len(v):
+        return []
     z = depth[v, u].astype(np.float64)
     k = view.intrinsics
     rays = np.stack(((step * u - k.cx) / k.fx * z, (step * v - k.cy) / k.fy * z, z))
@@ -81,6 +170,59 @@ def _cells(
     height = offset[2] + view.X_WC[2, 3] - floor_height
     inside = (height >= own.min_height) & (height <= own.max_height)
     inside &= np.hypot(offset[0], offset[1]) <= own.max_range
-    p_W = offset[:2, inside].T + view.X_WC[:2, 3]
-    cells: NDArray[np.int64] = np.floor(p_W[:, ::-1] / own.resolution).astype(np.int64)
-    return cells
+    whose = labels[v, u]
+    edges = {*np.unique(look.labels[:, 0]).tolist(), *np.unique(look.labels[:, -1]).tolist()}
+    found = []
+    for label in np.unique(whose).tolist():
+        mine = whose == label
+        middle = np.median(offset[:2, mine], axis=1)
+        middle *= 1.0 + BEHIND / max(float(np.hypot(*middle)), 1e-6)
+        x, y = (view.X_WC[:2, 3] + middle).tolist()
+        p_W = offset[:2, mine & inside].T + view.X_WC[:2, 3]
+        cells = np.unique(np.floor(p_W[:, ::-1] / own.resolution).astype(np.int64), axis=0)
+        found.append(_Sighting(label, int(mine.sum()), (x, y), cells, label in edges, look.time))
+    return found
+
+
+def _followed(old: MovingThing | None, sighting: _Sighting, floor_height: float) -> MovingThing:
+    position, time = sighting.position, sighting.time
+    if old is None or time - old.time > LONGEST_GAP:
+        anchor, since, walks = position, time, False
+    else:
+        if sighting.cut and math.dist(position, old.position) < BODY + STRAY:
+            # The middle of what is left of it in view is not its middle.
+            position = old.position
+        strayed = math.dist(position, old.anchor) > STRAY
+        anchor, since = (position, time) if strayed else (old.anchor, old.since)
+        walks = strayed or (old.walks and time - since < STILL)
+    return MovingThing(
+        sighting.label,
+        position,
+        read_only(sighting.cells),
+        floor_height,
+        time,
+        anchor,
+        since,
+        walks,
+    )
+
+
+def _seen_past(look: Look, thing: MovingThing, own: MappingParameters) -> bool:
+    """Whether a thing's place is in view, and the camera looks past where its middle was."""
+    if look.time <= thing.time:
+        return False
+    lens, X_WC = look.view.intrinsics, look.view.X_WC
+    x, y = thing.position
+    p_WP = np.array([(x, y, thing.floor_height + height) for height in HEIGHTS])
+    px, py, pz = ((p_WP - X_WC[:3, 3]) @ X_WC[:3, :3]).T.tolist()
+    for right, down, ahead in zip(px, py, pz, strict=True):
+        if ahead <= BODY:
+            continue
+        row = round(lens.fy * down / ahead + lens.cy)
+        columns = [round(lens.fx * (right + s) / ahead + lens.cx) for s in (-BODY, 0.0, BODY)]
+        if not (0 <= row < lens.height and columns[0] >= 0 and columns[2] < lens.width):
+            continue
+        depth = float(look.view.depth[row, columns[1]])
+        if ahead + PAST < depth and (math.isinf(depth) or depth < own.saturation):
+            return True
+    return False

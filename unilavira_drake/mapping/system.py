@@ -14,7 +14,8 @@ from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I
 
 from unilavira_drake.mapping.depth_scan import FREE_STEP, warm_up
 from unilavira_drake.mapping.depth_view import DepthView
-from unilavira_drake.mapping.moving_things import wanted, with_moving, without
+from unilavira_drake.mapping.moving_layer import with_moving
+from unilavira_drake.mapping.moving_things import Look, MovingThing, remembered, wanted, without
 from unilavira_drake.mapping.occupancy import NEWEST, MappingParameters, integrate
 from unilavira_drake.mapping.stair_corridor import StairCorridor, corridor_at
 from unilavira_drake.mapping.storeys import Storey, Storeys
@@ -50,7 +51,11 @@ class MapperState(Message):
     """The map, all storeys, and the pose and time of the latest integration."""
 
     occupancy: OccupancyMap = OccupancyMap()
+    """Of the storey where the robot is, with the things that move."""
     storeys: Storeys = Storeys()
+    """Without them."""
+    things: tuple[MovingThing, ...] = ()
+    """Those that move, as they are remembered."""
     position: tuple[float, float] = (0.0, 0.0)
     yaw: float = 0.0
     time: float = -math.inf
@@ -166,8 +171,10 @@ class OccupancyMapper(Level):
         if panorama.first > state.occupancy.n:
             oldest = context.get_time() - self._oldest
             frames = [frame for frame in panorama.frames if frame.time >= oldest]
-            views = tuple((DepthView.of(frame), self._moves[frame.label]) for frame in frames)
-            return self._integrated(context, state, X_WB, panorama.X_WB, views, panorama.n)
+            looks = tuple(
+                Look(DepthView.of(frame), self._moves[frame.label], frame.time) for frame in frames
+            )
+            return self._integrated(context, state, X_WB, panorama.X_WB, looks, panorama.n)
         if panorama.n > state.occupancy.n:
             occupancy = dc.replace(state.occupancy, n=panorama.n)
             return dc.replace(state, occupancy=occupancy)
@@ -180,8 +187,8 @@ class OccupancyMapper(Level):
         if corridor is not None:
             view = corridor.seen(view)
             state = _freed(state, corridor)
-        views = ((view, self._seen_moving(context)),)
-        return self._integrated(context, state, X_WB, X_WB, views, state.occupancy.n)
+        looks = (Look(view, self._seen_moving(context), context.get_time()),)
+        return self._integrated(context, state, X_WB, X_WB, looks, state.occupancy.n)
 
     def _corridor(
         self, context: Context, state: MapperState, X_WB: NDArray[np.float64]
@@ -195,11 +202,11 @@ class OccupancyMapper(Level):
         level = state.storeys.level_travel(place)
         return corridor_at(goal, place, half_width=width, level=level)
 
-    def _seen_moving(self, context: Context) -> NDArray[np.bool_]:
+    def _seen_moving(self, context: Context) -> NDArray[np.int16]:
         if self._label_image is None:
-            return np.zeros((1, 1), np.bool_)
-        moves: NDArray[np.bool_] = self._moves[pixels(self._label_image(context))[:, :, 0]]
-        return moves
+            return np.zeros((1, 1), np.int16)
+        labels: NDArray[np.int16] = self._moves[pixels(self._label_image(context))[:, :, 0]]
+        return labels
 
     def _due(self, time: float, state: MapperState, X_WB: NDArray[np.float64]) -> bool:
         if time - state.time >= self._rest_period - 1e-9:
@@ -216,17 +223,17 @@ class OccupancyMapper(Level):
         state: MapperState,
         X_WB: NDArray[np.float64],
         X_WB_seen: NDArray[np.float64],
-        views: tuple[tuple[DepthView, NDArray[np.bool_]], ...],
+        looks: tuple[Look, ...],
         n: int,
     ) -> MapperState:
-        """Returns the state after views that were taken when the base was at ``X_WB_seen``."""
+        """Returns the state after looks that were taken when the base was at ``X_WB_seen``."""
         time, position = context.get_time(), (float(X_WB[0, 3]), float(X_WB[1, 3]))
         up = (float(X_WB_seen[0, 2]), float(X_WB_seen[1, 2]), float(X_WB_seen[2, 2]))
         floor_height = float(X_WB_seen[2, 3]) - self._base_height / max(up[2], 0.5)
         storeys = state.storeys.at(floor_height, position)
         occupancy = integrate(
             storeys.occupancy,
-            tuple(without(view, moves) if moves.any() else view for view, moves in views),
+            tuple(without(look) for look in looks),
             parameters=self._parameters,
             position=position,
             floor_height=floor_height,
@@ -238,12 +245,20 @@ class OccupancyMapper(Level):
             # Nothing could be believed; motion is measured from the last pose that was one.
             occupancy = dc.replace(state.occupancy, n=n, rejected=occupancy.rejected)
             return dc.replace(state, occupancy=occupancy, time=time)
-        moving = [(view, moves) for view, moves in views if moves.any()]
-        if moving:
-            occupancy = with_moving(occupancy, moving, self._parameters, floor_height)
         # The versions of all storeys are one count.
         occupancy = dc.replace(occupancy, version=state.occupancy.version + 1)
-        return MapperState(occupancy, storeys.mapped(occupancy), position, _yaw(X_WB), time)
+        storeys, things = storeys.mapped(occupancy), state.things
+        if self._label_image is not None:
+            things = remembered(
+                things,
+                looks,
+                self._parameters,
+                robot=position,
+                floor_height=floor_height,
+                time=time,
+            )
+            occupancy = with_moving(occupancy, things, self._parameters, floor_height)
+        return MapperState(occupancy, storeys, things, position, _yaw(X_WB), time)
 
 
 def _freed(state: MapperState, corridor: StairCorridor) -> MapperState:

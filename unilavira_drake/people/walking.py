@@ -1,4 +1,4 @@
-"""How a person walks: pure functions of the walk and of what is ahead."""
+"""How a person walks: pure functions of the walk and of the robot about them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ ACCELERATION = 1.5
 TURN_GAIN, TURN_RATE = 4.0, 3.0
 """1/s of the heading's error, and at most rad/s."""
 AHEAD = math.radians(60.0)
-"""The robot is ahead of who walks within this angle of its direction."""
+"""The robot is ahead of who walks within this angle of its direction, ..."""
+ALONGSIDE = math.radians(120.0)
+"""... and within this one it is beside them or ahead."""
 FORESIGHT, FORESEEN = 0.25, 10
 """Polite people look so many steps of so many seconds ahead."""
 OUT_OF_REACH = 2.1
@@ -22,6 +24,10 @@ MARGIN = 0.25
 """What they want to keep between them and the robot, metres."""
 TURNING, TURNING_SOON = 0.10, 4
 """Metres to keep from what a robot sweeps when it turns, as far as so many steps go."""
+ELBOW, SOON = 0.15, 4
+"""Who would have the robot nearer than this, metres, within so many steps gives way to it."""
+SIDESTEP = 0.5
+"""Share of their speed at which they do so, whichever way they face."""
 STANDING = 0.05
 """A slower robot stands, metres a second."""
 REACHED = 0.10
@@ -132,17 +138,22 @@ def next_step(
     """
     x, y, yaw = pose
     walker = _arrived(person, walker, time, x, y)
+    target = _way_out(person, walker, robot, x, y) if manners.polite and robot else None
+    if target is not None and target != walker.target:
+        walker = dataclasses.replace(walker, target=target, way=-walker.way)
     goal_x, goal_y = person.walk[walker.target]
     bearing = math.atan2(goal_y - y, goal_x - x)
-    resting = time < max(walker.resume, person.delay)
+    resting = target is None and time < max(walker.resume, person.delay)
     waits = (
         not resting
+        and target is None
         and manners.polite
         and robot is not None
         and _must_wait(robot, x, y, bearing, person.speed, manners)
     )
     error = math.remainder(bearing - yaw, 2.0 * math.pi)
-    wish = 0.0 if resting or waits else person.speed * max(math.cos(error), 0.0)
+    least = 0.0 if target is None else SIDESTEP
+    wish = 0.0 if resting or waits else person.speed * max(math.cos(error), least)
     step = ACCELERATION * period
     speed = min(max(wish, walker.speed - 2.0 * step), walker.speed + step)
     walker = _patient(
@@ -159,7 +170,7 @@ def next_step(
     )
     turn = (
         0.0
-        if resting and walker.speed < 0.05
+        if target is not None or (resting and walker.speed < 0.05)
         else min(max(TURN_GAIN * error, -TURN_RATE), TURN_RATE)
     )
     return walker, Wish(speed * math.cos(bearing), speed * math.sin(bearing), turn)
@@ -197,6 +208,39 @@ def _patient(
     return dataclasses.replace(walker, target=target, way=-walker.way, held=-1.0)
 
 
+def _way_out(person: Person, walker: Walker, robot: RobotSeen, x: float, y: float) -> int | None:
+    """Returns the point of the walk to which the person gives way; None if there is no need to.
+
+    They leave their walk for nobody: they go on or back, whatever takes them farther from where
+    the robot comes too near, and stay if neither does.
+    """
+    if not robot.within_reach or math.hypot(robot.vx, robot.vy) < STANDING:
+        return None
+    steps = [k * FORESIGHT for k in range(1, SOON + 1)]
+    near = math.hypot(*robot.nearest(x, y))
+    staying = min(math.hypot(*robot.nearest(x, y, after)) for after in steps)
+    if staying > RADIUS + ELBOW or staying >= near:
+        return None
+    best, found = staying, None
+    for target in (walker.target, walker.target - walker.way):
+        if not 0 <= target < len(person.walk):
+            continue
+        dx, dy = person.walk[target][0] - x, person.walk[target][1] - y
+        left = math.hypot(dx, dy)
+        if left <= REACHED:
+            continue
+        # It takes them half a step to get going.
+        pace = SIDESTEP * person.speed
+        moved = [min(pace * (after - FORESIGHT / 2.0), left) / left for after in steps]
+        going = min(
+            math.hypot(*robot.nearest(x + dx * part, y + dy * part, after))
+            for part, after in zip(moved, steps, strict=True)
+        )
+        if going > best:
+            best, found = going, target
+    return found
+
+
 def _must_wait(
     robot: RobotSeen, x: float, y: float, bearing: float, speed: float, manners: Manners
 ) -> bool:
@@ -217,6 +261,9 @@ def _must_wait(
             return True
     if math.hypot(robot.vx, robot.vy) < STANDING:
         return False
+    # It may not see who walks along beside it, and turn.
+    if near < RADIUS + MARGIN and turn < ALONGSIDE:
+        return True
     for k in range(1, FORESEEN + 1):
         after = k * FORESIGHT
         distance = math.hypot(*robot.nearest(x + vx * after, y + vy * after, after))
