@@ -26,6 +26,7 @@ from unilavira_drake.messages import (
     Message,
     OccupancyMap,
     Panorama,
+    read_only,
 )
 from unilavira_drake.ports import (
     Level,
@@ -40,8 +41,8 @@ OLDEST_VIEW = 0.5
 """Where things move, older views of a panorama are not integrated, seconds."""
 MOVING_FREE_STEP = 10
 """There a thing in a place that was never seen free is forgotten after so few looks."""
-
-
+NOBODY = read_only(np.zeros((1, 1), np.int16))
+"""The labels of what moves in a view where nothing is known to."""
 SWAY = 0.1
 """Beside its footprint a robot on stairs needs so much room to keep to their axis, metres."""
 
@@ -172,7 +173,7 @@ class OccupancyMapper(Level):
             oldest = context.get_time() - self._oldest
             frames = [frame for frame in panorama.frames if frame.time >= oldest]
             looks = tuple(
-                Look(DepthView.of(frame), self._moves[frame.label], frame.time) for frame in frames
+                Look(DepthView.of(frame), self._moving(frame.label), frame.time) for frame in frames
             )
             return self._integrated(context, state, X_WB, panorama.X_WB, looks, panorama.n)
         if panorama.n > state.occupancy.n:
@@ -187,7 +188,9 @@ class OccupancyMapper(Level):
         if corridor is not None:
             view = corridor.seen(view)
             state = _freed(state, corridor)
-        looks = (Look(view, self._seen_moving(context), context.get_time()),)
+        reader = self._label_image
+        labels = NOBODY if reader is None else self._moving(pixels(reader(context))[:, :, 0])
+        looks = (Look(view, labels, context.get_time()),)
         return self._integrated(context, state, X_WB, X_WB, looks, state.occupancy.n)
 
     def _corridor(
@@ -202,11 +205,12 @@ class OccupancyMapper(Level):
         level = state.storeys.level_travel(place)
         return corridor_at(goal, place, half_width=width, level=level)
 
-    def _seen_moving(self, context: Context) -> NDArray[np.int16]:
+    def _moving(self, labels: NDArray[np.int16]) -> NDArray[np.int16]:
+        """Returns the labels of what moves, 0 elsewhere."""
         if self._label_image is None:
-            return np.zeros((1, 1), np.int16)
-        labels: NDArray[np.int16] = self._moves[pixels(self._label_image(context))[:, :, 0]]
-        return labels
+            return NOBODY
+        moving: NDArray[np.int16] = self._moves[labels]
+        return moving
 
     def _due(self, time: float, state: MapperState, X_WB: NDArray[np.float64]) -> bool:
         if time - state.time >= self._rest_period - 1e-9:
