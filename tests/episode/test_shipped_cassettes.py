@@ -15,6 +15,7 @@ from unilavira_drake.mllm.cassette_file import read_header, read_replies
 from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.resources import cassettes_path
 from unilavira_drake.scenario_loading import load_scenario
+from unilavira_drake.tasks import FAMILIES
 
 DEFAULT = "apartment"
 CASSETTES = sorted(path.stem for path in cassettes_path().glob("*.jsonl"))
@@ -49,7 +50,7 @@ def test_there_are_two_of_each_family_and_one_drives_back() -> None:
         families[load_scenario(header.scenario).tasks[task_name(header)].family] += 1
         lines = path.read_text(encoding="utf-8").splitlines()
         calls.update(json.loads(line)["call"] for line in lines[1:])
-    assert set(families) == {"vln", "objectnav", "eqa"}
+    assert set(families) == set(FAMILIES)
     assert min(families.values()) >= 2
     # Driven back, and decided anew from the pictures of the way that failed.
     assert calls["recover"] >= 1
