@@ -15,7 +15,7 @@ from unilavira_drake.robots.quadrotor_actuation import (
 )
 from unilavira_drake.robots.wind import STILL_AIR
 
-TIME_STEP = 0.005
+TIME_STEP = Quadrotor().max_time_step
 
 
 def add_flying_body(builder, robot, wind, start=(0.0, 0.0, 0.0)):
