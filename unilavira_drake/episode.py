@@ -176,6 +176,7 @@ def _map(
 ) -> bytes:
     z = float(episode.output("station", "cheat_X_WB").translation()[2])
     floor = world.storey_at(z)
+    goal = None if goal is None else goal.on(floor)
     return map_picture(
         world.storey(z),
         trace.on(lambda height: world.storey_at(height) == floor),

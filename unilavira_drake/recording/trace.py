@@ -64,6 +64,11 @@ class EpisodeTrace:
         elsewhere = self.away and self.away[0][0] <= self._points[0][0]
         return None if elsewhere else first, (x, y, last[2])
 
+    def height(self, n: int) -> float:
+        """Returns the height at panorama n, or at the latest one before it, metres."""
+        seen = [m for m in self._heights if m <= n]
+        return self._heights[max(seen)] if seen else 0.0
+
     def on(self, shown: Callable[[float], bool]) -> EpisodeTrace:
         """Returns the trace for the picture of one floor: what lies elsewhere is ``away``.
 
