@@ -174,10 +174,12 @@ def _verdict(
 def _map(
     world: World, trace: EpisodeTrace, episode: _Run, goal: GoalField | None, task: EpisodeTask
 ) -> bytes:
-    place = episode.output("station", "cheat_X_WB").translation()
+    z = float(episode.output("station", "cheat_X_WB").translation()[2])
+    floor = world.storey_at(z)
+    goal = None if goal is None else goal.on(floor)
     return map_picture(
-        world.storey(float(place[2])),
-        trace,
+        world.storey(z),
+        trace.on(lambda height: world.storey_at(height) == floor),
         episode.output("navigation", "map"),
         goals=() if goal is None else goal.places,
         goal_area=() if goal is None else success_area(goal, task.rule),

@@ -71,6 +71,30 @@ def test_the_trace_keeps_way_waypoints_backtracks_and_aims() -> None:
     }
 
 
+def test_what_lies_on_another_floor_is_told_from_the_way() -> None:
+    trace = EpisodeTrace()
+    for n, (t, x, z) in enumerate([(0.0, 1.0, 0.0), (8.0, 4.0, 2.8), (9.0, 5.0, 2.8)], start=1):
+        X_WB = pose(x, 1.0)
+        X_WB[2, 3] = z
+        trace.record(t, "", "", Panorama(n=n, X_WB=X_WB))
+        request = MllmRequest(n=n, variables=LanguageVariables(current_waypoint=n))
+        trace.record(t, "", "", request)
+        trace.record(t, "", "", Goal(n=n, kind="go", p_WG=(x + 1.0, 1.0, z)))
+    trace.record(0.0, "", "", LanguageAction(n=1, tool="backtrack", waypoint=1))
+    trace.record(2.0, "", "", NavigationStatus(n=1, state="arrived"))
+    for t in range(11):
+        trace.record(float(t), "", "", EpisodeMetrics(x=1.0 + 0.4 * t, y=1.0, z=min(0.4 * t, 2.8)))
+    upper, lower = (trace.on(lambda z, top=top: (z > 2.5) is top) for top in (True, False))
+    assert (upper.away, lower.away, trace.away) == (((0.0, 6.0),), ((7.0, 10.0),), ())
+    assert (upper.backtracks, lower.backtracks) == ((), ((0.0, 2.0),))
+    assert (list(upper.waypoints), list(lower.waypoints)) == ([2, 3], [1])
+    assert (upper.goals, lower.goals) == ([(5.0, 1.0), (6.0, 1.0)], [(2.0, 1.0)])
+    assert upper.ends[0] is None
+    assert lower.ends[0] == (1.0, 1.0, 0.0)
+    assert np.array_equal(upper.points, trace.points)
+    assert map_picture(WORLD, upper) != map_picture(WORLD, trace)
+
+
 def test_the_picture_is_a_png_of_the_same_bytes_each_time() -> None:
     occupancy = OccupancyMap(log_odds=np.array([[0, -5], [9, 0]], np.int8))
     pictures = [

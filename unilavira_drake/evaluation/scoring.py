@@ -10,6 +10,7 @@ for the last 20 m need not be flown (OpenUAV).
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -47,6 +48,18 @@ class GoalField(Message):
     def places(self) -> tuple[tuple[float, float], ...]:
         """Middle of each alternative, metres in the world; for pictures."""
         return tuple(target.place(self.world) for target in self.targets)
+
+    def on(self, elevation: float) -> GoalField:
+        """Returns the goal with the alternatives of one storey alone; for pictures."""
+        if len(self.world.elevations) < 2:
+            return self
+        kept = [i for i, target in enumerate(self.targets) if target.elevation == elevation]
+        return dataclasses.replace(
+            self,
+            targets=tuple(self.targets[i] for i in kept),
+            fields=tuple(self.fields[i] for i in kept),
+            ways=tuple(self.ways[i] for i in kept),
+        )
 
     def distances(self, x: float, y: float, z: float = 0.0) -> tuple[float, ...]:
         """Returns the geodesic distance to each alternative, metres; inf where there is no way."""

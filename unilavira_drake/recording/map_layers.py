@@ -30,6 +30,9 @@ START, END, GOAL = "#009e73", "#d55e00", "#b0206c"
 _GREYS = {UNKNOWN: 0.90, FREE: 1.0, OCCUPIED: 0.62}
 _WALL, _THING, _SLIGHT = "0.18", "#7a5230", "#c9b8a8"
 _WAY_WIDTH = 2.2
+_ELSEWHERE = "0.55"
+_SCALES = (1, 2, 5, 10, 20, 50, 100)
+"""Metres."""
 # All marks below are in points too: they keep their size in a larger world.
 _LANE = 4.0
 """Between a leg that was driven back and the way there."""
@@ -176,7 +179,11 @@ def draw_way(axes: Axes, trace: EpisodeTrace, point: float) -> LineCollection | 
     points = trace.points
     if len(points) < 2:
         return None
-    pieces = list(without(points, trace.backtracks))
+    pieces = list(without(points, (*trace.backtracks, *trace.away)))
+    away = [part_of(points, begin, end) for begin, end in trace.away if begin < end]
+    if away:
+        _lines(axes, away, 0.5 * _WAY_WIDTH, color=_ELSEWHERE, zorder=5.5)
+        axes.plot([], [], color=_ELSEWHERE, linewidth=0.5 * _WAY_WIDTH, label="on another floor")
     back = [part_of(points, begin, end) for begin, end in trace.backtracks]
     broken = [
         dash
@@ -218,9 +225,9 @@ def draw_places(axes: Axes, trace: EpisodeTrace, point: float) -> None:
 
 
 def draw_scale(axes: Axes, plan: FloorPlan, inches_per_metre: float) -> None:
-    """Draws a bar of one, two or five metres below the plan."""
+    """Draws a bar below the plan, of up to a fifth of its width."""
     x_min, y_min, x_max, _ = plan.bounds
-    metres = max(m for m in (1, 2, 5) if m == 1 or m <= 0.2 * (x_max - x_min))
+    metres = max(m for m in _SCALES if m == 1 or m <= 0.2 * (x_max - x_min))
     x, y = x_min + 0.3, y_min - 0.14 / inches_per_metre
     style: dict[str, Any] = {
         "color": "0.15",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,10 @@ class EpisodeTrace:
     """A listener that keeps the way of the robot, for the picture of the map."""
 
     def __init__(self) -> None:
-        self._points: list[tuple[float, float, float]] = []
+        self._points: list[tuple[float, float, float, float]] = []
+        self._waypoint_heights: dict[int, float] = {}
+        self._goal_heights: list[float] = []
+        self._heights: dict[int, float] = {}
         self._backtracks: list[int] = []
         self._departures: dict[int, float] = {}
         self.poses: dict[int, Pose] = {}
@@ -30,35 +35,71 @@ class EpisodeTrace:
         """Waypoint -> (x, y), metres in the world."""
         self.goals: list[tuple[float, float]] = []
         """The points that the agent chose to go to, metres in the world."""
+        self.away: tuple[tuple[float, float], ...] = ()
+        """When it was not on the floor that is shown, from and to, simulated seconds."""
 
     @property
     def points(self) -> NDArray[np.float64]:
         """(k, 3) float64: simulated seconds, x and y in metres in the world."""
-        return np.array(self._points, dtype=float).reshape(-1, 3)
+        return np.array(self._points, dtype=float).reshape(-1, 4)[:, :3]
 
     @property
     def backtracks(self) -> tuple[tuple[float, float], ...]:
         """Start and end of each backtrack, simulated seconds."""
-        return tuple(self.legs[n] for n in sorted(self._backtracks) if n in self.legs)
+        legs = (self.legs[n] for n in sorted(self._backtracks) if n in self.legs)
+        return tuple(
+            leg for leg in legs if not any(a < leg[1] and leg[0] < b for a, b in self.away)
+        )
 
     @property
     def ends(self) -> tuple[Pose | None, Pose | None]:
         """Where the way begins and ends, each along the front of the nearest panorama.
 
-        None before the first panorama.
+        None before the first panorama, and where it begins on a floor that is not shown.
         """
         if not self.poses:
             return None, None
         first, last = self.poses[min(self.poses)], self.poses[max(self.poses)]
-        x, y = self._points[-1][1:] if self._points else last[:2]
-        return first, (x, y, last[2])
+        x, y = self._points[-1][1:3] if self._points else last[:2]
+        elsewhere = self.away and self.away[0][0] <= self._points[0][0]
+        return None if elsewhere else first, (x, y, last[2])
+
+    def height(self, n: int) -> float:
+        """Returns the height at panorama n, or at the latest one before it, metres."""
+        seen = [m for m in self._heights if m <= n]
+        return self._heights[max(seen)] if seen else 0.0
+
+    def on(self, shown: Callable[[float], bool]) -> EpisodeTrace:
+        """Returns the trace for the picture of one floor: what lies elsewhere is ``away``.
+
+        Args:
+            shown: whether a height, metres in the world, belongs to the floor.
+        """
+        part = copy.copy(self)
+        part.waypoints = {
+            waypoint: place
+            for waypoint, place in self.waypoints.items()
+            if shown(self._waypoint_heights[waypoint])
+        }
+        aims = zip(self.goals, self._goal_heights, strict=True)
+        part.goals = [goal for goal, height in aims if shown(height)]
+        spans: list[tuple[float, float]] = []
+        before = True
+        for t, _, _, z in self._points:
+            here = shown(z)
+            if not here:
+                spans.append((t, t) if before else (spans.pop()[0], t))
+            before = here
+        part.away = tuple(spans)
+        return part
 
     def record(self, t: float, system: str, event: str, message: Any) -> None:
         """Takes a new message at a time, simulated seconds."""
         if isinstance(message, EpisodeMetrics):
-            self._points.append((t, message.x, message.y))
+            self._points.append((t, message.x, message.y, message.z))
         elif isinstance(message, Panorama):
             self.poses[message.n] = (*message.position[:2], message.yaw)
+            self._heights[message.n] = message.position[2]
         elif isinstance(message, MllmRequest):
             self._place_waypoint(message)
         elif isinstance(message, LanguageAction):
@@ -68,6 +109,7 @@ class EpisodeTrace:
         elif isinstance(message, Goal):
             if message.kind == "go" and message.p_WG is not None:
                 self.goals.append(message.p_WG[:2])
+                self._goal_heights.append(message.p_WG[2])
         elif isinstance(message, NavigationStatus):
             if message.terminal and message.n in self._departures:
                 self.legs[message.n] = (self._departures[message.n], t)
@@ -76,3 +118,4 @@ class EpisodeTrace:
         if isinstance(request.variables, LanguageVariables) and request.n in self.poses:
             waypoint = request.variables.current_waypoint
             self.waypoints.setdefault(waypoint, self.poses[request.n][:2])
+            self._waypoint_heights.setdefault(waypoint, self._heights[request.n])

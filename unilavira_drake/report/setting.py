@@ -8,6 +8,7 @@ from pathlib import Path
 from unilavira_drake.errors import UniLaviraError
 from unilavira_drake.evaluation.air_goal import make_goal
 from unilavira_drake.evaluation.goal_area import success_area
+from unilavira_drake.evaluation.scoring import GoalField
 from unilavira_drake.mllm.backends import make_backend
 from unilavira_drake.mllm.judges import make_judge
 from unilavira_drake.recording.floor_plan import FloorPlan, Outline, floor_plan
@@ -34,12 +35,22 @@ _GROUNDERS = {
 
 
 @dataclass(frozen=True, eq=False)
+class Storey:
+    """What is drawn of one floor."""
+
+    elevation: float
+    """Metres."""
+    plan: FloorPlan
+    goals: tuple[tuple[float, float], ...] = ()
+    goal_area: tuple[Outline, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Setting:
     """The scene of a run, as far as it can still be had."""
 
-    plan: FloorPlan | None = None
-    goals: tuple[tuple[float, float], ...] = ()
-    goal_area: tuple[Outline, ...] = ()
+    storeys: tuple[Storey, ...] = ()
+    """From the lowest up; none when the world cannot be had."""
     goal: str = ""
     """What the episode is scored against; empty when it is not."""
     task: str = ""
@@ -63,22 +74,28 @@ def read_setting(folder: Path, result: EpisodeResult | None) -> Setting:
     except (UniLaviraError, OSError) as error:
         told = f"Maps are without rooms and furniture: {error}"
         return Setting(models=models, problems=(told,))
-    goals, area, problems = _goal(task, world, scenario.robot.radius)
-    return Setting(
-        floor_plan(world), goals, area, task.goal, task.spec.text, models, problems=problems
-    )
+    goal, problems = _goal(task, world, scenario.robot.radius)
+    storeys = tuple(_storey(world, elevation, goal, task) for elevation in world.elevations)
+    return Setting(storeys, task.goal, task.spec.text, models, problems=problems)
 
 
 def _goal(
     task: EpisodeTask, world: World, radius: float
-) -> tuple[tuple[tuple[float, float], ...], tuple[Outline, ...], tuple[str, ...]]:
+) -> tuple[GoalField | None, tuple[str, ...]]:
     if not task.goal:
-        return (), (), ()
+        return None, ()
     try:
-        goal = make_goal(task.goal, world, task.rule, radius=radius)
+        return make_goal(task.goal, world, task.rule, radius=radius), ()
     except UniLaviraError as error:
-        return (), (), (f"The goal is not on the maps: {error}",)
-    return goal.places, success_area(goal, task.rule), ()
+        return None, (f"The goal is not on the maps: {error}",)
+
+
+def _storey(world: World, elevation: float, goal: GoalField | None, task: EpisodeTask) -> Storey:
+    plan = floor_plan(world.storey(elevation))
+    if goal is None:
+        return Storey(elevation, plan)
+    here = goal.on(elevation)
+    return Storey(elevation, plan, here.places, success_area(here, task.rule))
 
 
 def _described(scenario: Scenario) -> tuple[str, ...]:

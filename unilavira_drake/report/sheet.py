@@ -10,17 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.messages import VIEW_YAW
-from unilavira_drake.recording.floor_plan import FloorPlan, Outline
+from unilavira_drake.recording.floor_plan import Outline
 from unilavira_drake.recording.plan_labels import Label, Lettering, room_labels, thing_labels
 from unilavira_drake.recording.polylines import beside, stretch, without
+from unilavira_drake.recording.trace import EpisodeTrace
 from unilavira_drake.report.model import RunRecord, Step
-from unilavira_drake.report.setting import Setting
+from unilavira_drake.report.setting import Setting, Storey
+from unilavira_drake.worlds.world import BELOW_FLOOR
 
 WIDTH = 540.0
 """Units across the drawing, whatever the size of the world; about a pixel each."""
 ROOM_LETTER, THING_LETTER = 14.0, 9.5
 """Font sizes, units."""
 _COLORS = 24
+_ELSEWHERE = "#8c8c8c"
 _LANE = 5.0
 """Units between a leg that was driven back and the way there."""
 _CONE = 50.0
@@ -51,9 +54,28 @@ class Mark:
 
 
 @dataclass(frozen=True)
+class Floor:
+    """The plan of one floor, in units."""
+
+    name: str
+    """What tells it from other floors on the page; empty for the lowest."""
+    rooms: tuple[str, ...]
+    walls: tuple[str, ...]
+    openings: tuple[str, ...]
+    things: tuple[tuple[str, str, bool], ...]
+    """Name, outline and whether it is drawn lightly."""
+    room_words: tuple[Word, ...]
+    thing_words: tuple[Word, ...]
+    goals: tuple[tuple[float, float], ...]
+    goal_area: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Overlay:
     """What lies over the plan in one step; points are texts for SVG, empty when there are none."""
 
+    floor: str = ""
+    """The name of the floor on which the step begins."""
     occupancy: tuple[str, float, float, float, float] | None = None
     """Data URI, x, y, width and height."""
     way: str = ""
@@ -84,23 +106,19 @@ class Sheet:
     def __init__(self, run: RunRecord, setting: Setting) -> None:
         self._trace = run.trace
         self._first_seen = _first_seen(run.steps)
-        x_min, y_min, x_max, y_max = setting.plan.bounds if setting.plan else _bounds(run)
+        x_min, y_min, x_max, y_max = _bounds(run, setting)
         self._x_min, self._y_max = x_min, y_max
         self._scale = WIDTH / (x_max - x_min)
         self._lane = _LANE / self._scale
         self.width = WIDTH
         self.height = round((y_max - y_min) * self._scale, 1)
-        self.rooms: tuple[str, ...] = ()
-        self.walls: tuple[str, ...] = ()
-        self.openings: tuple[str, ...] = ()
-        self.things: tuple[tuple[str, str, bool], ...] = ()
-        """Name, outline and whether it is drawn lightly."""
-        self.room_words: tuple[Word, ...] = ()
-        self.thing_words: tuple[Word, ...] = ()
-        if setting.plan is not None:
-            self._draw_plan(setting.plan)
-        self.goals = tuple(self._point(x, y) for x, y in setting.goals)
-        self.goal_area = tuple(self._points(outline) for outline in setting.goal_area)
+        self._elevations = [storey.elevation for storey in setting.storeys]
+        self._parts = {name: self._part(name) for name in map(self._name, self._elevations)}
+        last = self._name(self._trace.height(run.steps[-1].n)) if run.steps else ""
+        self._shown = self._parts.get(last, self._trace)
+        self.floors = tuple(map(self._floor, setting.storeys))
+        """From the lowest up; none without a floor plan."""
+        self.has_goals = any(floor.goals for floor in self.floors)
 
     def overlay(self, step: Step, occupancy: str) -> Overlay:
         """Returns what lies over the plan in a step.
@@ -115,10 +133,12 @@ class Sheet:
         leg = stretch(points, decided, math.inf if ended is None else ended)
         back = step.action is not None and step.action.tool == "backtrack"
         pose = self._trace.poses.get(step.n)
+        floor = self._name(self._trace.height(step.n))
         p_WG = step.goal.p_WG if step.goal is not None else None
         aim = self._point(*p_WG[:2]) if p_WG is not None else None
         here = self._point(*pose[:2]) if pose is not None else None
         return Overlay(
+            floor=floor,
             occupancy=self._placed(step, occupancy),
             way=self._points(stretch(points, -math.inf, decided)[:, 1:]),
             leg=self._points((beside(leg, self._lane) if back else leg)[:, 1:]),
@@ -127,21 +147,23 @@ class Sheet:
             pose="" if pose is None else self._arrow(*pose),
             aim=aim,
             sight="" if aim is None or here is None else f"{here[0]},{here[1]} {aim[0]},{aim[1]}",
-            waypoints=self._waypoints(step.n),
+            waypoints=self._waypoints(self._parts.get(floor, self._trace), step.n),
         )
 
     def timed_way(self) -> tuple[tuple[str, str, bool], ...]:
-        """Returns the whole way in pieces: points, colour by time, whether driven back."""
-        points = self._trace.points
+        """Returns the whole way in pieces: points, color by time, whether driven back.
+
+        On other floors than that of the last step it is gray.
+        """
+        points, backtracks = self._trace.points, self._shown.backtracks
         if len(points) < 2:
             return ()
-        legs = [(piece, False) for piece in without(points, self._trace.backtracks)]
-        legs += [
-            (beside(stretch(points, *span), self._lane), True) for span in self._trace.backtracks
-        ]
+        elsewhere = (stretch(points, *span)[:, 1:] for span in self._shown.away)
+        pieces = [(self._points(piece), _ELSEWHERE, False) for piece in elsewhere if len(piece) > 1]
+        legs = [(piece, False) for piece in without(points, (*backtracks, *self._shown.away))]
+        legs += [(beside(stretch(points, *span), self._lane), True) for span in backtracks]
         bounds = np.linspace(points[0, 0], points[-1, 0], _COLORS + 1)
         colors = _viridis(_COLORS)
-        pieces = []
         for leg, back in legs:
             for color, begin, end in zip(colors, bounds[:-1], bounds[1:], strict=True):
                 piece = stretch(leg, float(begin), float(end))
@@ -149,37 +171,57 @@ class Sheet:
                     pieces.append((self._points(piece[:, 1:]), color, back))
         return tuple(pieces)
 
+    @property
+    def elsewhere(self) -> str:
+        """The color of the way on other floors; empty where there is none."""
+        return _ELSEWHERE if self._shown.away else ""
+
     def ends(self) -> tuple[str, ...]:
-        """Returns the arrows at start and end, empty without a panorama."""
-        first, last = self._trace.ends
-        return tuple("" if pose is None else self._arrow(*pose) for pose in (first, last))
+        """Returns the arrows at start and end, empty without a panorama or on another floor."""
+        return tuple("" if pose is None else self._arrow(*pose) for pose in self._shown.ends)
 
     def waypoints(self) -> tuple[Mark, ...]:
-        """Returns all waypoints."""
-        return self._waypoints(None)
+        """Returns all waypoints of the floor of the last step."""
+        return self._waypoints(self._shown, None)
 
-    def _waypoints(self, n: int | None) -> tuple[Mark, ...]:
+    def _waypoints(self, trace: EpisodeTrace, n: int | None) -> tuple[Mark, ...]:
         return tuple(
             Mark(str(waypoint), *self._point(*place))
-            for waypoint, place in sorted(self._trace.waypoints.items())
+            for waypoint, place in sorted(trace.waypoints.items())
             if n is None or self._first_seen.get(waypoint, 0) <= n
         )
 
-    def _draw_plan(self, plan: FloorPlan) -> None:
-        way = self._trace.points[:, 1:]
-        rooms = room_labels(plan, self._lettering(ROOM_LETTER, 0.66), way)
+    def _part(self, name: str) -> EpisodeTrace:
+        return self._trace.on(lambda z: self._name(z) == name)
+
+    def _name(self, z: float) -> str:
+        below = sum(elevation <= z + BELOW_FLOOR for elevation in self._elevations)
+        return str(below) if below > 1 else ""
+
+    def _floor(self, storey: Storey) -> Floor:
+        plan = storey.plan
+        name = self._name(storey.elevation)
+        here = self._parts[name]
+        way = without(here.points, here.away)
+        points = np.vstack([piece[:, 1:] for piece in way]) if way else np.zeros((0, 2))
+        rooms = room_labels(plan, self._lettering(ROOM_LETTER, 0.66), points)
         taken = [rectangle for _, rectangle in rooms]
         words = thing_labels(plan, self._lettering(THING_LETTER, 0.56), taken)
-        self.rooms = tuple(self._points(_corners(room.rectangle)) for room in plan.rooms)
-        self.walls = tuple(map(self._points, plan.walls))
-        self.openings = tuple(map(self._points, plan.openings))
-        self.things = tuple(
-            (thing.name, self._points(outline), thing.slight)
-            for thing in plan.things
-            for outline in thing.outlines
+        return Floor(
+            name=name,
+            rooms=tuple(self._points(_corners(room.rectangle)) for room in plan.rooms),
+            walls=tuple(map(self._points, plan.walls)),
+            openings=tuple(map(self._points, plan.openings)),
+            things=tuple(
+                (thing.name, self._points(outline), thing.slight)
+                for thing in plan.things
+                for outline in thing.outlines
+            ),
+            room_words=self._words(label for label, _ in rooms),
+            thing_words=self._words(words),
+            goals=tuple(self._point(x, y) for x, y in storey.goals),
+            goal_area=tuple(self._points(outline) for outline in storey.goal_area),
         )
-        self.room_words = self._words(label for label, _ in rooms)
-        self.thing_words = self._words(words)
 
     def _words(self, labels: Iterable[Label]) -> tuple[Word, ...]:
         return tuple(
@@ -246,7 +288,10 @@ def _first_seen(steps: Iterable[Step]) -> dict[int, int]:
     return seen
 
 
-def _bounds(run: RunRecord) -> tuple[float, float, float, float]:
+def _bounds(run: RunRecord, setting: Setting) -> tuple[float, float, float, float]:
+    if setting.storeys:
+        every = np.array([storey.plan.bounds for storey in setting.storeys])
+        return (*every[:, :2].min(axis=0).tolist(), *every[:, 2:].max(axis=0).tolist())
     places = [*run.trace.points[:, 1:].tolist(), *run.trace.goals]
     places += [pose[:2] for pose in run.trace.poses.values()] or [(0.0, 0.0)]
     points = np.array(places, float)

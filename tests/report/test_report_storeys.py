@@ -1,0 +1,73 @@
+"""The report of a house with two storeys: each step on the plan of its floor."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from run_on_paper import Pen, pose
+
+from unilavira_drake.evaluation.air_goal import make_goal
+from unilavira_drake.messages import LanguageAction, Outcome, Panorama
+from unilavira_drake.messages.metrics import EpisodeMetrics
+from unilavira_drake.recording.run_folder import RunFolder
+from unilavira_drake.report.model import read_run
+from unilavira_drake.report.page import render_report
+from unilavira_drake.report.setting import read_setting
+from unilavira_drake.scenario_loading import dump_scenario, load_scenario
+from unilavira_drake.task_choice import choose_task
+from unilavira_drake.worlds.load import load_world
+
+FLOORS = ((7.0, 1.2, 0.0), (7.0, 8.0, 2.8), (8.0, 8.0, 2.8))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("storeys") / "run"
+    with RunFolder(path) as run:
+        run.write("scenario.yaml", dump_scenario(load_scenario("two_storey")))
+        pen = Pen(run)
+        for n, (x, y, z) in enumerate(FLOORS, start=1):
+            X_WB = pose(x, y, 1.57)
+            X_WB[2, 3] = z
+            pen.say("observer", "panorama", Panorama(n, n, 0.1, X_WB, (), Outcome()))
+            pen.ask(n, "decide", n, ("{}",))
+            action = LanguageAction(n, "decide", "turn", "front")
+            pen.say("language", "language_action", action)
+            for _ in range(2):
+                pen.say("episode_monitor", "metrics", EpisodeMetrics(x=x, y=y, z=z))
+                x += 0.1
+    return path
+
+
+def test_each_step_lies_on_the_plan_of_its_floor(folder: Path) -> None:
+    page = render_report(folder)
+    assert re.findall(r'<g id="plan(\d*)">', page) == ["", "2"]
+    # The overview first, on the floor of the last step.
+    assert re.findall(r'<use href="#plan(\d*)"/>', page) == ["2", "", "2", "2"]
+    plans = page.split('<g id="plan2">')
+    assert "bathtub" in plans[1].split("</g>")[0]
+    assert "bathtub" not in plans[0]
+    assert "on another floor" in page
+
+
+def test_the_overview_tells_other_floors_from_the_last(folder: Path) -> None:
+    trace = read_run(folder).trace
+    assert [trace.height(n) for n in (0, 1, 2, 3, 9)] == [0.0, 0.0, 2.8, 2.8, 2.8]
+    assert sorted(trace.waypoints) == [1, 2, 3]
+    overview = render_report(folder).split("<svg")[2]
+    assert re.findall(r'dy=".35em">(\d)<', overview) == ["2", "3"]
+
+
+def test_the_goal_lies_on_its_own_floor(folder: Path) -> None:
+    lower, upper = read_setting(folder, None).storeys
+    assert (lower.elevation, upper.elevation) == (0.0, 2.8)
+    assert (lower.goals, lower.goal_area) == ((), ())
+    assert len(upper.goals) == 1
+    task = choose_task(load_scenario("two_storey"))
+    goal = make_goal("bathtub_1|sofa_1", load_world("two_storey"), task.rule, radius=0.2)
+    for elevation, room in ((0.0, "living_room"), (2.8, "bathroom")):
+        (target,) = goal.on(elevation).targets
+        assert target.elevation == elevation
+        assert room in target.rooms
