@@ -81,7 +81,6 @@ def _make_ground_navigation(
         max_yaw_acceleration=robot.max_yaw_acceleration,
         period=robot.hold,
     )
-    footprint = Footprint(half_length=robot.length / 2, half_width=robot.width / 2)
     # A command reaches the wheels in the plant's next step and shows in the one after; a body that
     # walks takes it two steps later.
     walks = robot.gait is not None
@@ -98,7 +97,7 @@ def _make_ground_navigation(
         # At rest the map is renewed once per rest period; half a period more is a late map.
         lambda: Governor(
             limits=limits,
-            footprint=footprint,
+            footprint=_footprint(robot),
             offset=time_step,
             map_timeout=1.5 * mapping.rest_period,
             newest=NEWEST if mapping.moving else 0,
@@ -127,6 +126,13 @@ def _make_ground_navigation(
     wiring.give_output("planner", "path")
     wiring.give_output("mapper", "map")
     return wiring.build("navigation")
+
+
+def _footprint(robot: GroundRobot) -> Footprint:
+    """A base that stops before a thing has room to turn in place, and its corners pass it."""
+    length, width = robot.length / 2, robot.width / 2
+    standoff = max(Footprint().standoff, math.hypot(length, width) - length)
+    return Footprint(half_length=length, half_width=width, standoff=standoff)
 
 
 def _time_to_turn_about(robot: GroundRobot) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from unilavira_drake.robots.stopping import Footprint
 from unilavira_drake.scenario import robot_kinds
 
 PATH = Path(__file__).resolve().parents[2] / "benchmarks" / "drives.py"
@@ -37,10 +38,23 @@ def test_it_drives_through_a_narrow_door(drives: Any, name: str, seed: int) -> N
     assert np.percentile(drive.errors, 95) < 0.10
 
 
-def test_a_stuck_robot_backs_off_and_gets_through(drives: Any) -> None:
+@pytest.mark.parametrize("seed", [9, 34])
+def test_a_base_that_stops_before_the_frame_turns_without_touching_it(
+    drives: Any, seed: int
+) -> None:
+    drive = drives.seeded_drive(robot_kinds()["cobot_magic"](), seed)
+    assert (drive.state, drive.backed_off, drive.contact) == ("arrived", False, 0.0)
+
+
+def test_a_stuck_robot_backs_off_and_gets_through(
+    drives: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # So near to the frame its corner meets it in the turn.
+    near = Footprint(standoff=0.05)
+    monkeypatch.setattr("unilavira_drake.navigation._footprint", lambda robot: near)
     drive = drives.seeded_drive(robot_kinds()["cobot_magic"](), 9)
-    assert drive.state == "arrived"
-    assert drive.contact > 1.0  # It touches the frame, backs off, and tries again.
+    assert (drive.state, drive.backed_off) == ("arrived", True)
+    assert drive.contact > 1.0
 
 
 def test_a_wall_without_a_door_is_told(drives: Any) -> None:
