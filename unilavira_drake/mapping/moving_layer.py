@@ -15,8 +15,8 @@ from unilavira_drake.messages import OccupancyMap
 from unilavira_drake.messages.cell_tiles import TILE, Key
 
 BERTH = 0.05
-"""What a way keeps beyond its own clearance to them, metres: so much more than the governor's
-courtesy that it does not hold the robot on ways that the planner finds."""
+"""What a way keeps beyond its own clearance to them, metres, or the governor's courtesy beside the
+base would hold the robot on ways that the planner finds."""
 
 
 def with_moving(
