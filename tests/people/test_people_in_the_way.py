@@ -79,6 +79,20 @@ def test_three_people_and_the_robot_pass_each_other(seed):
     assert (log.state, log.touched) == ("arrived", False)
 
 
+def test_the_map_keeps_who_stands_behind_the_robot_until_it_looks_there():
+    # It sees somebody ahead, and turns its only camera away to drive a little back.
+    people = {
+        "count": 1,
+        "polite": False,
+        "routes": [{"waypoints": ["4.1,5.7", "10.0,5.7"], "delay": 9.0}],
+    }
+    drive = Drive((3.0, 5.7, 0.0), (2.75, 5.7), people)
+    log = drive.run(8.9, until_arrived=False)
+    assert log.people[-1] == log.people[0]
+    x, y = log.people[-1][0]
+    assert drive.read(drive.navigation, "map").state_at(x, y) == "occupied"
+
+
 def test_impolite_people_push_and_are_felt():
     # The robot stands; its goal is where it is.
     people = {

@@ -14,9 +14,9 @@ from unilavira_drake.mapping.storeys import SAME_STOREY
 from unilavira_drake.messages import OccupancyMap
 from unilavira_drake.messages.cell_tiles import TILE, Key
 
-BERTH = 0.05
-"""What a way keeps beyond its own clearance to them, metres: so much more than the governor's
-courtesy that it does not hold the robot on ways that the planner finds."""
+BERTH = 0.12
+"""What a way keeps beyond its own clearance to them, metres: the planner's radius is that of a base
+that drives along, and the corners of one that turns round somebody reach farther."""
 
 
 def with_moving(

@@ -24,10 +24,15 @@ LABELS = 32768
 BODY = 0.25
 """Radius of a thing about its middle, of a person with arms, metres."""
 BEHIND = 0.10
-"""Its middle lies so far behind what is seen of it, metres."""
+"""Its middle lies so far behind what is seen of it, metres, ..."""
+INWARD = 0.19
+"""... and at least so far from the side of it that a view shows whose border cuts off the other."""
 BESIDE, STOOD = 1.5, 20.0
 """Who is no farther from the robot than this, metres, and was not seen to walk, is remembered for
 so long, seconds: a robot that drives sees who is farther, but not who is beside it."""
+PROVEN = 2.0
+"""Who was seen to stand for so long, seconds, is remembered as long wherever the robot is: or it
+would turn back on its way round them."""
 ELSEWHERE = 4.0
 """All others are remembered for so long, seconds."""
 STRAY, STILL = 0.15, 0.5
@@ -75,8 +80,9 @@ class MovingThing(Message):
 
     def forgotten(self, robot: Point, time: float) -> bool:
         """Whether it was seen too long ago for where the robot is."""
-        stands_beside = not self.walks and math.dist(self.position, robot) <= BESIDE
-        return time - self.time > (STOOD if stands_beside else ELSEWHERE)
+        beside = math.dist(self.position, robot) <= BESIDE
+        stands = not self.walks and (beside or self.time - self.since >= PROVEN)
+        return time - self.time > (STOOD if stands else ELSEWHERE)
 
 
 @dc.dataclass(frozen=True, eq=False)
@@ -85,8 +91,6 @@ class _Sighting:
     pixels: int
     position: Point
     cells: Cells
-    cut: bool
-    """Whether the border of the view cuts it off."""
     time: float
 
 
@@ -171,17 +175,33 @@ def _sightings(look: Look, own: MappingParameters, floor_height: float) -> list[
     inside = (height >= own.min_height) & (height <= own.max_height)
     inside &= np.hypot(offset[0], offset[1]) <= own.max_range
     whose = labels[v, u]
-    edges = {*np.unique(look.labels[:, 0]).tolist(), *np.unique(look.labels[:, -1]).tolist()}
     found = []
     for label in np.unique(whose).tolist():
         mine = whose == label
-        middle = np.median(offset[:2, mine], axis=1)
-        middle *= 1.0 + BEHIND / max(float(np.hypot(*middle)), 1e-6)
-        x, y = (view.X_WC[:2, 3] + middle).tolist()
+        cut = [bool((look.labels[:, column] == label).any()) for column in (0, -1)]
+        x, y = (view.X_WC[:2, 3] + _middle(offset[:2, mine], cut[0], cut[1])).tolist()
         p_W = offset[:2, mine & inside].T + view.X_WC[:2, 3]
         cells = np.unique(np.floor(p_W[:, ::-1] / own.resolution).astype(np.int64), axis=0)
-        found.append(_Sighting(label, int(mine.sum()), (x, y), cells, label in edges, look.time))
+        found.append(_Sighting(label, int(mine.sum()), (x, y), cells, look.time))
     return found
+
+
+def _middle(points: NDArray[np.float64], cut_left: bool, cut_right: bool) -> NDArray[np.float64]:
+    """Returns the middle of a thing of which points are seen, (2,), relative to the camera.
+
+    Args:
+        points: (2, k) relative to the camera, metres.
+        cut_left: whether the view's left border cuts it off.
+        cut_right: whether its right border does.
+    """
+    median = np.median(points, axis=1)
+    ahead = median / max(float(np.hypot(*median)), 1e-6)
+    middle: NDArray[np.float64] = median + BEHIND * ahead
+    if cut_left == cut_right:
+        return middle
+    towards = np.array([-ahead[1], ahead[0]]) * (1.0 if cut_left else -1.0)
+    side = float(np.percentile(towards @ (points - median[:, None]), 5.0))
+    return middle + towards * max(side + INWARD, 0.0)
 
 
 def _followed(old: MovingThing | None, sighting: _Sighting, floor_height: float) -> MovingThing:
@@ -189,9 +209,6 @@ def _followed(old: MovingThing | None, sighting: _Sighting, floor_height: float)
     if old is None or time - old.time > LONGEST_GAP:
         anchor, since, walks = position, time, False
     else:
-        if sighting.cut and math.dist(position, old.position) < BODY + STRAY:
-            # The middle of what is left of it in view is not its middle.
-            position = old.position
         strayed = math.dist(position, old.anchor) > STRAY
         anchor, since = (position, time) if strayed else (old.anchor, old.since)
         walks = strayed or (old.walks and time - since < STILL)

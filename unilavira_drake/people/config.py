@@ -37,7 +37,8 @@ class PeopleConfig:
     max_speed: float = 1.2
     min_pause: float = 1.0
     max_pause: float = 6.0
-    # true: they stop when the robot is nearer than stop_distance (metres) ahead of them.
+    # true: they stop when the robot is nearer than stop_distance (metres) ahead of them, and give
+    # way along their walk when it would touch them.
     # false: they keep walking, and push what they meet.
     polite: bool = True
     stop_distance: float = 1.0

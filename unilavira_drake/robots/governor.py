@@ -87,7 +87,7 @@ class Governor(LeafSystem):
         command_timeout: float = 0.3,
         map_timeout: float = 3.0,
         newest: int = 0,
-        courtesy: tuple[float, float] = (0.20, 0.05),
+        courtesy: tuple[float, float] = (0.35, 0.10),
         reply_timeout: float = 150.0,
         pose_timeout: float = 0.3,
         max_lateral_speed: float = 0.0,
