@@ -93,9 +93,10 @@ def test_an_answer_is_no_markup_and_no_command_to_the_terminal(answer: str) -> N
     assert row(printed(dataclasses.replace(ANSWERED, metrics=metrics)), "answer") == shown
 
 
-def test_only_a_flight_has_a_path_type() -> None:
+def test_a_flight_has_a_path_type_and_no_room() -> None:
     flown = dataclasses.replace(ANSWERED, metrics=MetricsResult(path_type="hard"))
     assert row(printed(flown), "path type") == "hard"
+    assert "stopped within 3 m" not in printed(flown)
     assert "path type" not in printed(ANSWERED)
 
 

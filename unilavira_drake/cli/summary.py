@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from unilavira_drake.messages.metrics import CAUSES
-from unilavira_drake.recording.result import EpisodeResult
+from unilavira_drake.recording.result import EpisodeResult, MetricsResult
 from unilavira_drake.report.figures import cost_figures, judge_figures
 from unilavira_drake.scenario import Scenario
 
@@ -60,12 +60,9 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
     metrics, counts = result.metrics, result.counts
     rows = [
         ("navigation error", _metres(metrics.navigation_error_m)),
-        ("in the goal's room", _YES_NO[metrics.same_room]),
-        ("goal in the last view", _YES_NO[metrics.goal_seen]),
-        ("stopped within 3 m", _YES_NO[metrics.success_3m]),
+        *_where(metrics),
         ("path length", _metres(metrics.path_length_m)),
         ("shortest path", _metres(metrics.shortest_path_m)),
-        *_path_type(metrics.path_type),
         ("SPL", "-" if metrics.spl is None else f"{metrics.spl:.2f}"),
         ("collisions", str(metrics.collisions)),
         ("decisions", str(counts.decisions)),
@@ -87,9 +84,15 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
     return [*rows, *judge_figures(result), *cost_figures(result.usage)]
 
 
-def _path_type(value: str | None) -> list[tuple[str, str]]:
-    """Only flights have one."""
-    return [] if value is None else [("path type", value)]
+def _where(metrics: MetricsResult) -> list[tuple[str, str]]:
+    """A flight has a path type; room, view and 3 m have no part in its success."""
+    if metrics.path_type is not None:
+        return [("path type", metrics.path_type)]
+    return [
+        ("in the goal's room", _YES_NO[metrics.same_room]),
+        ("goal in the last view", _YES_NO[metrics.goal_seen]),
+        ("stopped within 3 m", _YES_NO[metrics.success_3m]),
+    ]
 
 
 def _metres(value: float | None) -> str:
