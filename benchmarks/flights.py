@@ -34,6 +34,9 @@ GUSTS = 0.3
 ROTORS = (0.19, 0.19, (-0.025, 0.045))
 """Half the sides of the body with its propellers, and its lowest and highest, metres."""
 
+SAMPLE = 0.01
+"""Seconds between two looks at pose and contacts: each step of the plant."""
+
 
 @dataclass(frozen=True)
 class Flight:
@@ -175,7 +178,7 @@ def _watched(
     deepest, force, clearance = 0.0, 0.0, math.inf
     cpu = time.process_time()
     while True:
-        simulator.AdvanceTo(root.get_time() + 0.02)
+        simulator.AdvanceTo(root.get_time() + SAMPLE)
         X_WB = station.GetOutputPort("cheat_X_WB").Eval(inside)
         x, y, z = X_WB.multiply(p_BQ)
         room = np.minimum(width / 2 - np.abs(y - door), LINTEL - z)
