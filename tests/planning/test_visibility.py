@@ -226,6 +226,15 @@ def test_a_long_wall_is_gone_around_in_the_larger_window():
     assert found.length >= 2 * math.dist((10.0, 38.6), (0.0, 0.0)) - 10.0
 
 
+def test_a_goal_behind_a_wall_is_gone_to_and_not_given_up_before_it():
+    wall = (0.0, -35.0, 0.0, 0.5, 35.0, 25.0)
+    target = (1.75, 0.25, 3.25)
+    found = plan([GROUND, wall], (-4.0, 0.0, 3.0), target)
+    assert not found.reason
+    np.testing.assert_allclose(found.p_WP[-1], target, atol=0.5)
+    assert np.abs(found.p_WP[:, 1]).max() > 35.0
+
+
 def test_an_aircraft_on_the_ground_takes_off():
     found = plan([GROUND], (0.0, 0.0, 0.2), (20.0, 0.0, 4.0))
     np.testing.assert_allclose(found.p_WP[0], (0.0, 0.0, 0.2))

@@ -113,7 +113,8 @@ def make_flight_plan(
     """Returns a plan to the free space nearest to a target.
 
     It is searched in a box around aircraft and target, and when there is no way in it, in a much
-    larger one.  Unknown space is taken to be free.
+    larger one; only then may it end at another place, the nearest that can be reached.  Unknown
+    space is taken to be free.
 
     Args:
         space: where the aircraft may fly.
@@ -128,19 +129,23 @@ def make_flight_plan(
     if math.dist(position, target) > parameters.max_distance:
         return FlightPlan(reason=f"farther than {parameters.max_distance:g} m")
     voxels = math.dist(position, target) / space.voxels.resolution
+    near, far = max(20, int(0.3 * voxels)), max(200, int(1.5 * voxels))
     reason = ""
-    for margin in (max(20, int(0.3 * voxels)), max(200, int(1.5 * voxels))):
+    # The last resort is for goals whose larger box has too many voxels.
+    for margin, elsewhere in ((near, False), (far, True), (near, True)):
         window = _window(space, (position, target), margin, parameters)
         if window is None:
-            return FlightPlan(reason=reason or TOO_MANY)
+            reason = reason or TOO_MANY
+            continue
         start = way_out(space, window, position, _escape(position, parameters))
         if start is None:
             return FlightPlan(reason=NO_WAY_OUT)
-        plan = _plan_in(space, window, start, position, target, viewpoint, goal, parameters)
+        places = (position, target, viewpoint, goal)
+        plan = _plan_in(space, window, start, places, parameters, elsewhere=elsewhere)
         if not plan.reason:
             return plan
         reason = plan.reason
-        if reason != UNREACHABLE:
+        if reason != (TOO_MANY if margin == far else UNREACHABLE):
             break
     return FlightPlan(reason=reason)
 
@@ -149,13 +154,17 @@ def _plan_in(
     space: FlightSpace,
     window: FlightWindow,
     start: NDArray[np.float64],
-    position: Point,
-    target: Point,
-    viewpoint: Point,
-    goal: Point | None,
+    places: tuple[Point, Point, Point, Point | None],
     parameters: FlightParameters,
+    *,
+    elsewhere: bool,
 ) -> FlightPlan:
-    """Returns the plan within one window."""
+    """Returns the plan within one window.
+
+    ``places`` are the caller's position, target, viewpoint and goal; ``elsewhere`` tells whether
+    the plan may end at another place when there is no way to the free space nearest to the target.
+    """
+    position, target, viewpoint, goal = places
 
     def end_in(free: FlightWindow) -> NDArray[np.float64] | None:
         return snap_goal(
@@ -176,7 +185,8 @@ def _plan_in(
     nodes = route(window, start, end, slopes)
     if not len(nodes):
         within_reach = reachable(window, start)
-        found = None if not within_reach.is_blocked(end) else end_in(within_reach)
+        other = elsewhere and within_reach.is_blocked(end)
+        found = end_in(within_reach) if other else None
         if found is not None:
             nodes = route(window, start, found, slopes)
         if not len(nodes):
