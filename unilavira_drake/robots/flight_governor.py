@@ -120,17 +120,18 @@ class FlightGovernor(LeafSystem):
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         desired: Any = self._desired(context)
+        wish: list[float] = desired.tolist()
         old: Any = context.get_discrete_state(self._setpoint_index).value()
-        valid = self._obeyed(context, desired)
+        valid = self._obeyed(context, wish)
         X_WB: Any = self._pose(context).GetAsMatrix34()
         p_WB = X_WB[:, 3]
-        seen = bool(np.isfinite(p_WB).all())
-        lost = self._lost(context, discrete_state, X_WB)
+        seen = all(map(math.isfinite, p_WB.tolist()))
+        lost = self._lost(context, discrete_state, X_WB.ravel().tolist())
         if math.isnan(old[0]):
             if not (valid and seen):
                 return
-            old = np.array([*p_WB, desired[3], 0.0, 0.0, 0.0])
-        elif valid and not lost and np.array_equal(old, desired[:7]) and not old[4:].any():
+            old = np.array([*p_WB, wish[3], 0.0, 0.0, 0.0])
+        elif valid and not lost and old.tolist() == wish[:7] and not any(wish[4:7]):
             return
         setpoint = np.array(old)
         if seen:
@@ -145,13 +146,14 @@ class FlightGovernor(LeafSystem):
         setpoint[4:] = v
         setpoint[:3] += self._limits.period * v
         if valid:
-            setpoint[3] = next_yaw(setpoint[3], float(desired[3]), self._limits)
+            setpoint[3] = next_yaw(setpoint[3], wish[3], self._limits)
         discrete_state.set_value(self._setpoint_index, setpoint)  # type: ignore[arg-type]
 
-    def _obeyed(self, context: Context, desired: NDArray[np.float64]) -> bool:
+    def _obeyed(self, context: Context, desired: list[float]) -> bool:
         """Whether a command is finite and fresh, and no reply is overdue."""
         time = context.get_time()
-        if not (abs(time - desired[7]) <= self._command_timeout and np.isfinite(desired).all()):
+        fresh = abs(time - desired[7]) <= self._command_timeout
+        if not (fresh and all(map(math.isfinite, desired))):
             return False
         for reader in self._awaited:
             awaited = reader.optional(context)
@@ -160,17 +162,18 @@ class FlightGovernor(LeafSystem):
                 return False
         return True
 
-    def _lost(self, context: Context, discrete_state: DiscreteValues, X_WB: Any) -> bool:
+    def _lost(self, context: Context, discrete_state: DiscreteValues, pose: list[float]) -> bool:
         """Whether nobody knows how the aircraft moves."""
         time = context.get_time()
-        twist: Any = self._twist(context)
-        speed = math.sqrt(float(twist[3:] @ twist[3:])) if np.isfinite(twist).all() else math.nan
+        twist: list[float] = self._twist(context).tolist()
+        speed = math.hypot(*twist[3:]) if all(map(math.isfinite, twist)) else math.nan
         seen: Any = context.get_discrete_state(self._seen_index).value()
-        if not np.array_equal(seen[:12], X_WB.ravel()):
-            now: Any = np.array([*X_WB.ravel(), time])
+        *before, since = seen.tolist()
+        if before != pose:
+            now: Any = np.array([*pose, time])
             discrete_state.set_value(self._seen_index, now)
-            return not (math.isfinite(speed) and bool(np.isfinite(X_WB).all()))
-        return math.isnan(speed) or (speed > MOVING and time - float(seen[12]) > self._pose_timeout)
+            return not (math.isfinite(speed) and all(map(math.isfinite, pose)))
+        return math.isnan(speed) or (speed > MOVING and time - since > self._pose_timeout)
 
     def _velocity(
         self, context: Context, setpoint: NDArray[np.float64], desired: NDArray[np.float64] | None
