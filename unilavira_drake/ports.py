@@ -36,7 +36,6 @@ class InputReader(Generic[T]):
         self._type = type_
         self._name = name
         self._port = system.DeclareAbstractInputPort(name, model)
-        self._once_fed = False
 
     @property
     def ticket(self) -> Any:
@@ -68,18 +67,8 @@ class InputReader(Generic[T]):
 
     def optional(self, context: Context) -> T | None:
         """Returns the value on the port, or None when nothing is connected."""
-        # HasValue costs as much as Eval, and an exception on a port that is left free a hundred
-        # times as much: what was fed once is read without asking.
-        if not self._once_fed:
-            if not self._port.HasValue(context):
-                return None
-            self._once_fed = True
-        try:
-            return self(context)
-        except PortTypeError:
-            if self._port.HasValue(context):
-                raise
-            return None
+        # Asked first: an exception on a port that is left free costs a hundred times as much.
+        return self(context) if self._port.HasValue(context) else None
 
 
 def message_input(system: LeafSystem, name: str, default: T) -> InputReader[T]:
