@@ -66,9 +66,8 @@ MOVED = 0.1
 """Metres in a chunk that count as motion."""
 RATIO = 1.35
 """Width of the door by that of the aircraft for which there is a target."""
-KNOWN = FlightConfig(resolution=0.05, snap_distance=0.5)
-"""Doors are a few centimetres wider than they must be: finer voxels than the 0.1 m of rooms; and a
-goal behind a wall is not moved to this side of it."""
+KNOWN = FlightConfig(resolution=0.05)
+"""Doors are a few centimetres wider than they must be: finer voxels than the 0.1 m of rooms."""
 ASTRAY = 0.5
 """Who ends farther from its goal has not arrived, metres."""
 
