@@ -33,6 +33,8 @@ class Leg:
     """Of ``heading``: metres along the ground from the start ..."""
     bearing: float = 0.0
     """... in this direction, degrees to the left of the first front."""
+    roof: str = ""
+    """Colour of the landmark's roof: from above it is this one that is seen."""
 
     @property
     def thing(self) -> str:
@@ -58,6 +60,7 @@ def describe(leg: Leg) -> str:
         )
     if leg.kind == "along":
         return f"Fly along the {leg.thing}"
+    roof = f" with a {leg.roof} roof" if leg.roof else ""
     beside = f" near the {leg.beside}" if leg.beside else ""
     side = f" on the {leg.side}" if leg.side else ""
-    return f"{_THING[leg.kind]} {leg.thing}{beside}{side}"
+    return f"{_THING[leg.kind]} {leg.thing}{roof}{beside}{side}"

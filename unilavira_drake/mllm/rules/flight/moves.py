@@ -24,6 +24,8 @@ _BACK = 12.0
 """What each place where the aircraft was speaks against the view to it, metres of free distance."""
 _NEAR_PLACE = 80.0
 """Farther places are not minded, metres."""
+_AROUND = 60.0
+"""Nearer to a stated place one searches around it, and minds where one was, metres."""
 _PROMISE = 8.0
 """What each landmark in a view is worth to the search, metres of free distance."""
 _FAILED = 50.0
@@ -114,7 +116,7 @@ def _chosen(
     """
     found = []
     goal = situation.stated()
-    for i, sight in enumerate(situation.scene.matching(leg)):
+    for i, sight in enumerate(situation.meant(leg)):
         if ahead and sight.direction == DOWN:
             continue
         cost = -sight.distance if ahead else sight.away
@@ -193,14 +195,15 @@ def _search(situation: FlightSituation, side: str) -> Move:
         return turn(DOWN, BELOW, scene.height, 0.0, why, LOOKOUT - scene.height)
     stated = situation.stated()
     goal = stated[1] if stated is not None else _SIDES[side] if side else None
+    around = stated is not None and stated[0] <= _AROUND
 
     def worth(direction: str) -> float:
         axis = math.degrees(VIEW_YAW[direction])
         value = scene.free.get(direction, 0.0) - situation.tried(direction)
         value += _PROMISE * min(len(_landmarks(situation, direction)), 5)
         if goal is not None:
-            return value - _apart(axis, goal)
-        return value - _visited(situation, axis)
+            value -= _apart(axis, goal)
+        return value - _visited(situation, axis) if goal is None or around else value
 
     best = max(DIRECTIONS, key=lambda d: (round(worth(d), 3), -DIRECTIONS.index(d)))
     bearing = math.degrees(VIEW_YAW[best])

@@ -11,7 +11,7 @@ import dataclasses
 import re
 
 from unilavira_drake.mllm.rules.flight.legs import Leg
-from unilavira_drake.mllm.rules.flight.parts import NUMBER, legs_of, mentions_of
+from unilavira_drake.mllm.rules.flight.parts import NUMBER, ROOF, legs_of, mentions_of
 from unilavira_drake.stated_direction import stated_direction
 
 MAX_LEGS = 30
@@ -29,9 +29,9 @@ _IDLE = re.compile(r"\bthere are\b|\bis not\b|^the other\b|\bruns\b")
 """A sentence that gives no order and names no goal."""
 _UNTIL = re.compile(r",?\s+(?:until|till)\s+")
 _WITH = re.compile(
-    r"\bwith (?:\w+ ){0,6}?(?:roofs?|legs|band|gates|towers?|ponds?|gardens|left|right|side)\b"
+    rf"\bwith (?!{ROOF})(?:\w+ ){{0,6}}?(?:roofs?|legs|band|gates|towers?|ponds?|gardens|left|right|side)\b"
 )
-"""What something looks like, or what is seen on the way."""
+"""What something looks like, or what is seen on the way; the colour of a roof is kept."""
 
 
 def parse_directive(text: str, height: float = 0.0) -> tuple[Leg, ...]:
@@ -103,7 +103,9 @@ def _merged(legs: list[Leg]) -> list[Leg]:
             and last.kind == "go"
             and leg.color in ("", last.color)
         ):
-            merged[-1] = dataclasses.replace(leg, color=last.color, beside=last.beside)
+            merged[-1] = dataclasses.replace(
+                leg, color=last.color, roof=leg.roof or last.roof, beside=last.beside
+            )
         else:
             merged.append(leg)
     return merged

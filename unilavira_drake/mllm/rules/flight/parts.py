@@ -42,6 +42,8 @@ _ROLES = (
 )
 _NEXT = re.compile(r"\b(?:to the|towards?|past|over|across|as far as|up to)\b")
 """Between two landmarks: the second is gone to as well, and does not tell where the first is."""
+ROOF = rf"(?:an? |the |its |their )?(?P<color>{'|'.join(sorted(COLOR_NAMES))}) roofs?\b"
+_ROOF = re.compile(f"with {ROOF}")
 _BESIDE = re.compile(r"\b(?:near|beside|next to|by|in front of|behind|opposite|at|of|in|on)\b")
 
 
@@ -127,14 +129,26 @@ def mentions_of(part: str) -> list[Mention]:
     color, i = "", 0
     while i < len(words):
         name, length = landmark_at(words, i)
-        if words[i] in COLOR_NAMES and not name:
+        if words[i] == "with" and (more := _roof_at(words, i)[1]):
+            i += more - 1
+        elif words[i] in COLOR_NAMES and not name:
             color = color_name(words[i])
         elif name:
-            found.append(Mention(Leg("go", name, color), i - bool(color), i + length))
+            roof, more = _roof_at(words, i + length)
+            leg = Leg("go", name, color, roof=roof)
+            found.append(Mention(leg, i - bool(color), i + length + more))
             color = ""
-            i += length - 1
+            i += length + more - 1
         i += 1
     return found
+
+
+def _roof_at(words: list[str], start: int) -> tuple[str, int]:
+    """Returns the colour of ``with a red roof`` at a place, and its number of words, 0 for none."""
+    found = _ROOF.match(" ".join(words[start : start + 4]))
+    if found is None:
+        return "", 0
+    return color_name(found.group("color")), len(found.group().split())
 
 
 def _with_role(part: str, before: str, mention: Mention, *, landing: bool) -> Leg:

@@ -58,12 +58,12 @@ def _left_behind(step: FlightStep, situation: FlightSituation) -> bool:
     It is out of sight, and the next one is near, or the stated place of the goal is.
     """
     after = next_landmark(step, situation.steps)
-    if not _ends_at_landmark(step.leg) or after is None or situation.scene.matching(step.leg):
+    if not _ends_at_landmark(step.leg) or after is None or situation.meant(step.leg):
         return False
     stated = situation.stated()
     if stated is not None and stated[0] <= NEAR_GOAL:
         return True
-    return any(sight.distance <= NEXT for sight in situation.scene.matching(after))
+    return any(sight.distance <= NEXT for sight in situation.meant(after))
 
 
 def next_landmark(step: FlightStep, steps: tuple[FlightStep, ...]) -> Leg | None:
@@ -95,7 +95,7 @@ def _met(step: FlightStep, situation: FlightSituation) -> str:
 def _way_done(step: FlightStep, situation: FlightSituation) -> str:
     """A way is done when the landmark at its end is seen, or nothing is to come after it."""
     after = next_landmark(step, situation.steps)
-    seen = situation.scene.matching(after) if after is not None else []
+    seen = situation.meant(after) if after is not None else []
     if seen:
         return f"{seen[0].name} in view ({seen[0].id})"
     if step.leg.kind == "heading":

@@ -16,9 +16,9 @@ from unilavira_drake.mllm.request import ViewNote
 from unilavira_drake.mllm.rules.flight.legs import Leg
 from unilavira_drake.mllm.rules.flight.words import (
     GROUND,
-    color_match,
     landmark_class,
     landmark_match,
+    looks,
 )
 from unilavira_drake.mllm.rules.vocabulary import color_name
 
@@ -87,15 +87,15 @@ class AirScene:
         return min(below, key=lambda s: (s.detection.pixels, s.id)).name if below else ""
 
     def matching(self, leg: Leg) -> list[LandmarkSight]:
-        """Returns the things a leg means, best class match first, then the nearest."""
+        """Returns the things a leg means, best match of class and colour only, nearest first."""
         found = [
-            (-landmark_match(leg.landmark, s.category), s.away, i)
+            ((-landmark_match(leg.landmark, s.category), -_looks(leg, s)), s.away, i)
             for i, s in enumerate(self.sights)
             if landmark_match(leg.landmark, s.category)
-            and color_match(leg.color, s.color)
+            and _looks(leg, s)
             and (not leg.beside or self._stands_beside(s, leg.beside))
         ]
-        best = min((rank for rank, _, _ in found), default=0)
+        best = min((rank for rank, _, _ in found), default=(0, 0))
         return [self.sights[i] for rank, _, i in sorted(found) if rank == best]
 
     def _stands_beside(self, sight: LandmarkSight, landmark: str) -> bool:
@@ -105,6 +105,10 @@ class AirScene:
         return any(
             math.dist(sight.position, m.position) <= BESIDE or m.category in GROUND for m in marks
         )
+
+
+def _looks(leg: Leg, sight: LandmarkSight) -> int:
+    return looks(leg.color, leg.roof, sight.color, above=sight.direction == DOWN)
 
 
 def look_around(views: Sequence[ViewEvidence], notes: Sequence[ViewNote]) -> AirScene:

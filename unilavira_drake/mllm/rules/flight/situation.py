@@ -12,6 +12,7 @@ from unilavira_drake.mllm.request import LanguageVariables, MllmRequest, Waypoin
 from unilavira_drake.mllm.rules.flight.legs import Leg
 from unilavira_drake.mllm.rules.flight.parser import parse_directive, plan_legs
 from unilavira_drake.mllm.rules.flight.scene import AirScene, LandmarkSight, look_around
+from unilavira_drake.stated_direction import stated_direction
 
 REACH = 8.0
 """A landmark below or beside is reached from this height over it, metres."""
@@ -25,7 +26,10 @@ PASSING = 25.0
 """One that is only passed: along the ground, metres."""
 LEVEL = 2.5
 """A height is reached within this, metres."""
-
+DOUBT = 40.0
+"""So far from a stated place its thing may stand, metres ..."""
+_DOUBT_SHARE = 0.3
+"""... and this share of the stated distance farther."""
 
 MEASURED = 30.0
 """Higher up the depth camera may not see the ground, metres."""
@@ -56,12 +60,17 @@ class FlightSituation:
         return next((w for w in self.variables.waypoints if w.id == current), None)
 
     @property
+    def start(self) -> WaypointNote | None:
+        """The first waypoint, or None once it is forgotten."""
+        return next((w for w in self.variables.waypoints if w.id == 1), None)
+
+    @property
     def height(self) -> float:
         """Metres above the ground: measured, or where that is too far by the climb since the start.
 
         The start's height stands in the sentence about it that an earlier reply left.
         """
-        start = min(self.variables.waypoints, key=lambda w: w.id, default=None)
+        start = self.start
         told = _HEIGHT.search(start.scene) if start is not None else None
         if start is None or told is None or self.scene.height <= MEASURED:
             return self.scene.height
@@ -72,9 +81,23 @@ class FlightSituation:
         """The steps still to be done, in order."""
         return tuple(step for step in self.steps if not step.done)
 
+    def meant(self, leg: Leg) -> list[LandmarkSight]:
+        """Returns the things in view that a leg may mean, nearest first.
+
+        Where the task states its goal's place, a thing far from there is not what the flight ends
+        at, although it looks the same.
+        """
+        sights = self.scene.matching(leg)
+        told, stated = stated_direction(self.variables.task), self.stated()
+        if leg.kind != "stop" or told is None or stated is None:
+            return sights
+        angle, doubt = math.radians(stated[1]), DOUBT + _DOUBT_SHARE * told.distance
+        goal = stated[0] * math.cos(angle), stated[0] * math.sin(angle)
+        return [s for s in sights if math.dist(s.position, goal) <= doubt]
+
     def reached(self, leg: Leg) -> LandmarkSight | None:
         """Returns the landmark of a leg if the aircraft is where the leg wants it."""
-        for sight in self.scene.matching(leg):
+        for sight in self.meant(leg):
             if leg.kind == "over":
                 there = sight.below
             elif leg.kind in ("past", "go"):
@@ -95,15 +118,14 @@ class FlightSituation:
         return FAILED * failures + 15.0 * (len(own) - failures)
 
     def stated(self) -> tuple[float, float] | None:
-        """Returns (metres, degrees to the left) to the place that the plan states, from here."""
-        step = next((s for s in self.steps if s.leg.kind == "heading"), None)
-        start = min(self.variables.waypoints, key=lambda w: w.id, default=None)
-        if step is None or start is None:
+        """Returns (metres, degrees to the left) to the place that the task states, from here."""
+        goal, start = stated_direction(self.variables.task), self.start
+        if goal is None or start is None:
             return None
         to_start, heading = math.radians(start.bearing), math.radians(start.heading)
-        angle = heading + math.radians(step.leg.bearing)
-        x = start.distance * math.cos(to_start) + step.leg.distance * math.cos(angle)
-        y = start.distance * math.sin(to_start) + step.leg.distance * math.sin(angle)
+        angle = heading + math.radians(goal.bearing)
+        x = start.distance * math.cos(to_start) + goal.distance * math.cos(angle)
+        y = start.distance * math.sin(to_start) + goal.distance * math.sin(angle)
         return math.hypot(x, y), math.degrees(math.atan2(y, x))
 
 

@@ -16,9 +16,9 @@ from unilavira_drake.mllm.rules.flight.parser import parse_directive
 from unilavira_drake.mllm.rules.flight.words import (
     GROUND,
     WAYS,
-    color_match,
     landmark_class,
     landmark_match,
+    looks,
 )
 from unilavira_drake.mllm.rules.vocabulary import color_name
 
@@ -127,7 +127,8 @@ def _free_text(variables: VisionVariables, view: ViewEvidence) -> dict[str, Any]
             for d in view.detections:
                 category = landmark_class(d.category)
                 if leg.landmark and landmark_match(leg.landmark, category):
-                    if color_match(leg.color, d.color):
+                    above = view.direction == DOWN
+                    if looks(leg.color, leg.roof, d.color, above=above):
                         return _marked(_name(d), d, view)
     return _open_ground(view, 0.0)
 

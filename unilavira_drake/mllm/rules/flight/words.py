@@ -108,6 +108,21 @@ def landmark_match(wanted: str, seen: str) -> int:
     return int(seen in _GENERAL.get(wanted, ()) or wanted in _GENERAL.get(seen, ()))
 
 
+def looks(wanted: str, roof: str, seen: str, *, above: bool) -> int:
+    """Returns 2 where a thing has the colour that is meant, 1 where only its light may differ.
+
+    Args:
+        wanted: colour word of the thing, or empty.
+        roof: colour word of its roof, or empty.
+        seen: colour that it shows.
+        above: whether it is seen straight from above, where a dark thing in the sun looks pale.
+    """
+    if color_match(wanted, seen) or (roof and color_match(roof, seen)):
+        return 2
+    grays = ("white", "gray", "beige", "black")
+    return int(above and color_name(wanted) in grays and color_name(seen) in grays)
+
+
 def color_match(wanted: str, seen: str) -> bool:
     """Whether a colour word may be meant; seen against the sky gray and white are one."""
     pale = ("white", "gray", "beige")
