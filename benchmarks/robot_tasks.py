@@ -18,8 +18,6 @@ from unilavira_drake import load_scenario, run_episode
 from unilavira_drake.scenario_loading import robot_setting
 
 GROUND = ("cobot_magic", "unitree_go1", "unitree_g1")
-TOWN = ("easy_market_fountain", "easy_red_van", "easy_water_tower", "hard_green_car")
-TOWN += ("hard_east_statue",)
 STOREYS = ("bathtub", "yellow_bed", "sofa", "refrigerator")
 Episode = tuple[str, str, str, int]
 """Scenario, robot (empty: the scenario's), task and seed."""
@@ -29,7 +27,7 @@ def groups(seeds: int) -> dict[str, list[Episode]]:
     """Returns the episodes of each group."""
     return {
         "route": [("apartment", r, "fridge", seed) for r in GROUND for seed in range(seeds)],
-        "town": [("town", "", task, 0) for task in TOWN],
+        "town": [("town", "", task, 0) for task in load_scenario("town").tasks],
         "rooms": [("flat", "quadrotor", "couch", seed) for seed in range(2)],
         "storeys": [("two_storey", "", task, 0) for task in STOREYS],
         "people": [("apartment_people", "", "fridge", seed) for seed in range(seeds)],

@@ -2,15 +2,19 @@
 
 import dataclasses
 import json
+import math
 
 import pytest
 from flight_town import CENTERS, Town, run
 
 from unilavira_drake.messages import DOWN, TodoItem
+from unilavira_drake.mllm.evidence import Detection
 from unilavira_drake.mllm.request import LanguageVariables
 from unilavira_drake.mllm.rules import RulesDials, RulesModel
 from unilavira_drake.mllm.rules.flight.legs import Leg, describe
 from unilavira_drake.mllm.rules.flight.parser import parse_directive, plan_legs
+from unilavira_drake.mllm.rules.flight.scene import AirScene, LandmarkSight
+from unilavira_drake.mllm.rules.flight.words import looks
 
 REACH = 20.0
 """What the judge of the family calls success, metres."""
@@ -52,6 +56,14 @@ LEGS = {
     "Head to the left of the church, pass the school, and stop at the parking lot.": [
         "Fly to the church", "Fly past the school", "Stop at the car park",
     ],
+    "Fly past the hall with the blue roof and two greenhouses with white roofs. In the yard stands "
+    "a wooden barn with its red roof, beside a house with a black roof: stop over the barn.": [
+        "Fly past the greenhouse with a white roof", "Stop at the brown barn with a red roof",
+    ],
+    "Pass the fire station with a flat roof and gates, and stop at the pavilion with the red roof "
+    "on your left.": [
+        "Fly past the fire station", "Stop at the pavilion with a red roof on the left",
+    ],
 }  # fmt: skip
 
 
@@ -77,6 +89,8 @@ def test_directives_are_read_leg_by_leg(text):
             for beside in ("", "fountain")
             for side in ("", "left")
         ),
+        Leg("stop", "barn", "brown", "house", "left", roof="red"),
+        Leg("over", "town hall", roof="green"),
     ],
     ids=describe,
 )
@@ -115,6 +129,57 @@ def test_a_thing_out_of_sight_is_searched_from_higher_up(town):
     assert flight.stopped
     assert flight.away("car") <= REACH
     assert max(pose[2] for *_, pose in flight.steps) >= 22.0
+
+
+def test_what_looks_the_same_far_from_the_stated_place_is_not_the_goal(town):
+    """A red car stands beside the start, the blue one where the task says."""
+    start = (50.0, 0.0, 12.0, 0.0)
+    text = "The target is about 135 metres away, 26 degrees to your left. It is a car."
+    flight = run(town, RulesModel(), text, start=start)
+    assert flight.stopped
+    assert flight.away("blue_car") <= REACH
+    assert run(town, RulesModel(), "Find the car.", start=start).away("car") <= REACH
+
+
+def test_the_search_around_a_stated_place_goes_to_all_sides(town):
+    text = "The target is about 60 metres away, straight ahead. It is a yellow boat."
+    flight = run(town, RulesModel(), text, budget=16)
+    sides = {(x > 75.0) - (x < 45.0) for *_, (x, *_) in flight.steps[4:]}
+    sides |= {10 * ((y > 20.0) - (y < -20.0)) for *_, (_, y, *_) in flight.steps[4:]}
+    assert {1, -1, 10, -10} <= sides
+    assert all(math.hypot(x - 60.0, y) <= 80.0 for *_, (x, y, *_) in flight.steps)
+
+
+@pytest.mark.parametrize(
+    ("color", "roof", "seen", "above", "expected"),
+    [
+        ("black", "", "black", False, 2),
+        ("black", "", "white", False, 0),
+        ("black", "", "white", True, 1),
+        ("red", "", "white", True, 0),
+        ("brown", "red", "red", False, 2),
+        ("brown", "red", "brown", True, 2),
+        ("brown", "red", "green", True, 0),
+        ("", "red", "green", False, 2),
+    ],
+)
+def test_the_colour_of_a_thing_is_that_of_its_body_its_roof_or_its_light(
+    color, roof, seen, above, expected
+):
+    assert looks(color, roof, seen, above=above) == expected
+
+
+def test_a_thing_with_the_very_colour_is_preferred_to_one_that_only_the_light_may_have_made():
+    pale, exact = _sight("white", DOWN, 5.0), _sight("black", "front", 30.0)
+    leg = Leg("stop", "statue", "black")
+    assert AirScene((pale, exact), {}).matching(leg) == [exact]
+    assert AirScene((pale,), {}).matching(leg) == [pale]
+    assert AirScene((_sight("white", "front", 5.0),), {}).matching(leg) == []
+
+
+def _sight(color, direction, distance):
+    seen = Detection(id=direction, category="statue", color=color)
+    return LandmarkSight(direction, "statue", color, direction, 0.0, distance, 5.0, False, seen)
 
 
 def test_without_a_list_it_flies_on_what_the_history_tells(town):

@@ -195,15 +195,16 @@ def _search(situation: FlightSituation, side: str) -> Move:
         return turn(DOWN, BELOW, scene.height, 0.0, why, LOOKOUT - scene.height)
     stated = situation.stated()
     goal = stated[1] if stated is not None else _SIDES[side] if side else None
-    around = stated is not None and stated[0] <= _AROUND
+    # Around the stated place its direction tells ever less, and where one was ever more.
+    near = max(1.0 - stated[0] / _AROUND, 0.0) if stated is not None else float(goal is None)
 
     def worth(direction: str) -> float:
         axis = math.degrees(VIEW_YAW[direction])
         value = scene.free.get(direction, 0.0) - situation.tried(direction)
         value += _PROMISE * min(len(_landmarks(situation, direction)), 5)
         if goal is not None:
-            value -= _apart(axis, goal)
-        return value - _visited(situation, axis) if goal is None or around else value
+            value -= (1.0 - near) * _apart(axis, goal)
+        return value - min(2.0 * near, 1.0) * _visited(situation, axis)
 
     best = max(DIRECTIONS, key=lambda d: (round(worth(d), 3), -DIRECTIONS.index(d)))
     bearing = math.degrees(VIEW_YAW[best])

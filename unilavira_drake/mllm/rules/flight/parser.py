@@ -29,7 +29,8 @@ _IDLE = re.compile(r"\bthere are\b|\bis not\b|^the other\b|\bruns\b")
 """A sentence that gives no order and names no goal."""
 _UNTIL = re.compile(r",?\s+(?:until|till)\s+")
 _WITH = re.compile(
-    rf"\bwith (?!{ROOF})(?:\w+ ){{0,6}}?(?:roofs?|legs|band|gates|towers?|ponds?|gardens|left|right|side)\b"
+    rf"\bwith (?!{ROOF})(?:\w+ ){{0,6}}?"
+    r"(?:roofs?|legs|band|gates|towers?|ponds?|gardens|left|right|side)\b"
 )
 """What something looks like, or what is seen on the way; the colour of a roof is kept."""
 
