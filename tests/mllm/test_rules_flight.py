@@ -209,6 +209,29 @@ class _Blind(RulesModel):
         return super().complete(dataclasses.replace(request, evidence=views))
 
 
+@pytest.mark.parametrize(
+    ("last", "height", "climb"),
+    [
+        ("turn front to 'yellow boat': arrived: on the way", 30.0, -15.0),
+        ("turn front to 'yellow boat': arrived", 30.0, None),
+        ("turn front to 'red car': arrived: on the way", 30.0, None),
+        ("turn front to 'yellow boat': arrived: on the way", 15.0, 10.0),
+    ],
+)
+def test_what_was_lost_on_the_way_is_looked_for_from_lower(town, last, height, climb):
+    request = run(
+        town, RulesModel(), "Stop at the yellow boat.", start=(0.0, 0.0, height, 0.0), budget=1
+    ).steps[0][0]
+    todo = (TodoItem("Stop at the yellow boat"),)
+    variables = dataclasses.replace(
+        request.variables, todo=todo, last_action=f"at waypoint 1: {last}", outcome="arrived"
+    )
+    asked = dataclasses.replace(request, call="decide", variables=variables)
+    action = json.loads(RulesModel().complete(asked).text)["action"]
+    assert action["climb"] == (climb if climb is None else pytest.approx(climb, abs=0.2))
+    assert (action["direction"] == DOWN) == (climb is not None)
+
+
 def test_a_stop_far_from_the_last_landmark_is_rejected(town):
     flight = run(town, RulesModel(), "Stop at the red car.", budget=2)
     request = flight.steps[-1][0]

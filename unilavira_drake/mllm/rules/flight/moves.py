@@ -70,6 +70,8 @@ def next_move(situation: FlightSituation, progress: FlightProgress) -> Move:
     sight = _chosen(situation, hard, side) if hard is not None else None
     if sight is not None and hard is not None:
         return _to_sight(situation, hard, sight)
+    if hard is not None and situation.lost(hard):
+        return _look_lower(situation, hard)
     if situation.variables.bearings is not None:
         return _by_numbers(situation, side)
     along = next((leg for leg in soft if leg.kind == "along"), None)
@@ -146,6 +148,12 @@ def _to_sight(situation: FlightSituation, leg: Leg, sight: LandmarkSight) -> Mov
         climb = 10.0
         why += "; higher, because the way was not free"
     return turn(sight.direction, sight.name, sight.distance, sight.bearing, why, climb)
+
+
+def _look_lower(situation: FlightSituation, leg: Leg) -> Move:
+    """Goes down to half the height: what lies between the level views and the one below shows."""
+    why = f"the {leg.thing} was in view on the way here: look from lower"
+    return turn(DOWN, BELOW, situation.height, 0.0, why, -situation.height / 2.0)
 
 
 def _by_numbers(situation: FlightSituation, side: str) -> Move:

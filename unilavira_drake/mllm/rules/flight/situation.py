@@ -110,6 +110,15 @@ class FlightSituation:
                 return sight
         return None
 
+    def lost(self, leg: Leg) -> bool:
+        """Whether the last move was on the way to a leg's landmark, high, and has lost sight of it.
+
+        Level views end above what is near, and the view straight down before it.
+        """
+        way = rf" to '[^']*{re.escape(leg.landmark)}[^']*': arrived: {ON_THE_WAY}"
+        high = self.height > 2.0 * REACH
+        return bool(leg.landmark) and high and bool(re.search(way, self.variables.last_action))
+
     def tried(self, direction: str) -> float:
         """Returns what earlier tries in a direction from here speak against it, metres."""
         texts = self.here.tried if self.here else ()
