@@ -19,7 +19,7 @@ from unilavira_drake.scenario import Budgets
 PERIOD = 0.1
 
 
-def watch(build, *, flies=False, status=None):
+def watch(build, *, flies=False, status=None, later=None):
     """Runs a plant that ``build`` fills for 1.5 s under a monitor; returns its metrics."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, 0.01)
@@ -32,13 +32,20 @@ def watch(build, *, flies=False, status=None):
     simulator = Simulator(diagram)
     prepare(plant.GetMyMutableContextFromRoot(simulator.get_mutable_context()))
     own = monitor.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+
+    def fix(name, value):
+        monitor.GetInputPort(name).FixValue(own, AbstractValue.Make(value))
+
     for name, value in (
         ("cheat_X_WB", RigidTransform()),
         ("language_action", LanguageAction()),
         ("panorama", Panorama()),
         ("navigation_status", status or NavigationStatus()),
     ):
-        monitor.GetInputPort(name).FixValue(own, AbstractValue.Make(value))
+        fix(name, value)
+    if later is not None:
+        simulator.AdvanceTo(0.3)
+        later(simulator, fix)
     simulator.AdvanceTo(1.5)
     return monitor.GetOutputPort("metrics").Eval(own)
 
@@ -93,6 +100,7 @@ def test_standing_on_the_floor_is_none():
     ("status", "collisions"),
     [
         (NavigationStatus(0, "moving"), 0),
+        (NavigationStatus(0, "failed"), 0),
         (NavigationStatus(0, "arrived"), 1),
         (NavigationStatus(3, "moving"), 1),
     ],
@@ -106,3 +114,17 @@ def test_the_floor_carries_an_aircraft_only_until_it_has_taken_off(status, colli
 def test_an_aircraft_that_stands_may_bump_into_a_wall_all_the_same():
     metrics = watch(sliding_block(0.2), flies=True, status=NavigationStatus(0, "moving"))
     assert metrics.collisions == 1
+
+
+@pytest.mark.parametrize(("moved", "collisions"), [(0.0, 0), (0.5, 1)])
+def test_an_aircraft_that_could_not_take_off_stands_until_it_moves(moved, collisions):
+    def later(simulator, fix):
+        fix("navigation_status", NavigationStatus(0, "failed"))
+        simulator.AdvanceTo(0.5)
+        fix("navigation_status", NavigationStatus(1, "arrived"))
+        fix("cheat_X_WB", RigidTransform([0.0, 0.0, moved]))
+
+    metrics = watch(
+        ball_on_the_floor, flies=True, status=NavigationStatus(0, "moving"), later=later
+    )
+    assert metrics.collisions == collisions

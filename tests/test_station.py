@@ -7,14 +7,19 @@ from pydrake.geometry import QueryObject, Role, SceneGraph
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from unilavira_drake.diagram import make_navigation_diagram
 from unilavira_drake.errors import TaskError
 from unilavira_drake.messages import Frame
 from unilavira_drake.robots.planar_base import planar_pose
+from unilavira_drake.robots.quadrotor import Quadrotor
+from unilavira_drake.robots.unitree_go1 import UnitreeGo1
 from unilavira_drake.scenario import NamedTask, Scenario, TaskChoice, WorldChoice
+from unilavira_drake.scenario_loading import load_scenario
 from unilavira_drake.sensors.detections import GroundTruthDetector
 from unilavira_drake.sensors.rig import front_intrinsics
 from unilavira_drake.sensors.scene_camera import SceneCamera
-from unilavira_drake.station import add_navigation_station
+from unilavira_drake.station import add_navigation_station, make_navigation_station
+from unilavira_drake.task_choice import start_pose
 from unilavira_drake.worlds.load import load_world
 
 WORLD = load_world("flat")
@@ -263,3 +268,15 @@ def test_a_mirrored_station_shows_the_mirrored_view():
     assert np.median(difference) < 1e-4
     colors = np.abs(plain.color.astype(int) - mirror.color[:, ::-1].astype(int))[same]
     assert np.median(colors) <= 1
+
+
+@pytest.mark.parametrize("make", [make_navigation_station, make_navigation_diagram])
+def test_an_aircraft_upstairs_is_refused_by_whoever_builds_it(make):
+    # Changed after it was read, so that no check of the file has seen it.
+    scenario = load_scenario("two_storey")
+    scenario.task.start = "7.0,8.4,2.8,1.57"
+    scenario.robot = UnitreeGo1(can_climb=True)
+    assert start_pose(scenario, load_world("two_storey")) == (7.0, 8.4, 2.8, 1.57)
+    scenario.robot = Quadrotor()
+    with pytest.raises(TaskError, match="takes off from the ground floor"):
+        make(scenario)

@@ -23,19 +23,16 @@ from unilavira_drake.people.config import tells_of_people
 from unilavira_drake.people.crowd import detected_labels, make_crowd, with_people
 from unilavira_drake.people.tracker import PeopleTracker
 from unilavira_drake.recording.recorder import Recorder
-from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.robots.recalibration import Recalibration
-from unilavira_drake.robots.robot import GroundRobot
 from unilavira_drake.scenario import Scenario, plant_config
 from unilavira_drake.sensors.detections import GroundTruthDetector
 from unilavira_drake.sensors.free_distance import axial_distance, free_distance, warm_up
 from unilavira_drake.sensors.observer import Observer
 from unilavira_drake.sensors.rig import front_intrinsics
 from unilavira_drake.station import make_navigation_station
-from unilavira_drake.task_choice import choose_task
+from unilavira_drake.task_choice import choose_task, start_pose
 from unilavira_drake.wiring import Wiring
 from unilavira_drake.worlds.load import load_world
-from unilavira_drake.worlds.start import parse_start_pose
 from unilavira_drake.worlds.world import World
 
 FRAMES_KEPT = 16
@@ -70,7 +67,7 @@ def make_navigation_diagram(
         PortTypeError: if a replaced level lacks a port.
     """
     own = dict(replace or {})
-    if "locomotion" in own and not isinstance(scenario.robot, GroundRobot):
+    if "locomotion" in own and scenario.robot.flies:
         raise ScenarioError("replace: 'locomotion' moves bodies on the ground; leave it out.")
     warm_up()  # The agent takes this function from us; no System of its own compiles it.
     grounder = has_grounder(scenario.grounder, own)
@@ -79,10 +76,7 @@ def make_navigation_diagram(
         load_world(scenario.world.name, mirror=scenario.world.mirror), scenario.people
     )
     task = choose_task(scenario)
-    robot = scenario.robot
-    x, y, height, yaw = parse_start_pose(
-        task.start, world, radius=robot.turning_radius, climbs=robot.leaves_the_ground
-    )
+    x, y, height, yaw = start_pose(scenario, world)
     intrinsics = front_intrinsics(scenario.robot)
     wiring = Wiring(own)
     wiring.add("task", lambda: ConstantValueSource(AbstractValue.Make(task.spec)))
@@ -141,7 +135,7 @@ def make_navigation_diagram(
             intrinsics=intrinsics,
             mapping=mapping_among(scenario.people, scenario.mapping),
             planning=planning_among(scenario.people, scenario.planning),
-            flight=scenario.flight.within(mirrored=world.mirrored),
+            flight=scenario.flight.mirrored_if(world.mirrored),
             tick=scenario.tick,
             time_step=plant_config(scenario).time_step,
             replace=own,
@@ -154,7 +148,7 @@ def make_navigation_diagram(
             period=scenario.tick,
             budgets=task.budgets,
             goal_distance=goal_distance,
-            flies=isinstance(scenario.robot, Quadrotor),
+            flies=scenario.robot.flies,
         ),
     )
     _close_the_ring(wiring, scenario.robot.views)
@@ -175,7 +169,7 @@ def make_navigation_diagram(
                 on_message,
                 period=scenario.tick,
                 grounder=grounder,
-                in_flight=isinstance(scenario.robot, Quadrotor),
+                in_flight=scenario.robot.flies,
             ),
         )
         _listen(wiring, todo=scenario.ablation in ("full", "no_scb"), grounder=grounder)
@@ -188,7 +182,7 @@ def make_navigation_diagram(
 def _free_distance(scenario: Scenario) -> Callable[[Frame], float]:
     """Returns what measures how far a view is free: over a floor, or along an aircraft's axis."""
     max_range = scenario.robot.max_depth
-    if isinstance(scenario.robot, Quadrotor):
+    if scenario.robot.flies:
         return functools.partial(axial_distance, max_range=max_range)
     return functools.partial(
         free_distance,

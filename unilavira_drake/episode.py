@@ -43,9 +43,8 @@ from unilavira_drake.recording.tally import Tally
 from unilavira_drake.recording.trace import EpisodeTrace
 from unilavira_drake.scenario import Scenario
 from unilavira_drake.scenario_loading import dump_scenario
-from unilavira_drake.task_choice import EpisodeTask, choose_task
+from unilavira_drake.task_choice import EpisodeTask, choose_task, start_pose
 from unilavira_drake.worlds.load import load_world
-from unilavira_drake.worlds.start import parse_start_pose
 from unilavira_drake.worlds.world import World
 
 ADVANCE = 1.0
@@ -80,13 +79,7 @@ def run_episode(
     """
     task = choose_task(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
-    start = parse_start_pose(
-        task.start,
-        world,
-        radius=scenario.robot.turning_radius,
-        climbs=scenario.robot.leaves_the_ground,
-        flies=scenario.robot.flies,
-    )
+    start = start_pose(scenario, world)
     goal = None
     if task.goal:
         goal = make_goal(task.goal, world, task.rule, radius=scenario.robot.radius)

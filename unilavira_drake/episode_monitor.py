@@ -51,6 +51,8 @@ class MonitorState(Message):
     panorama: int = 0
     action: int = 0
     status: tuple[int, str] = (0, "arrived")
+    takeoff: str = "arrived"
+    """How far an aircraft's way up is: the latest state of goal 0."""
     yaw: float = 0.0
     counted: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the latest step of the path ended, metres."""
@@ -197,12 +199,16 @@ class EpisodeMonitor(Level):
             state.metrics, decisions=state.metrics.decisions + int(decided), progress_time=time
         )
         return dataclasses.replace(
-            state, metrics=metrics, panorama=panorama, action=action.n, status=seen
+            state,
+            metrics=metrics,
+            panorama=panorama,
+            action=action.n,
+            status=seen,
+            takeoff=status.state if status.n == 0 else state.takeoff,
         )
 
     def _follow_contacts(self, context: Context, state: MonitorState) -> MonitorState:
-        status = self._status(context)
-        carried = not self._flies or (status.n == 0 and not status.terminal)
+        carried = not self._flies or _stands(state)
         force = _collision_force(self._contacts(context), carried=carried)
         touching = force > CONTACT_FORCE
         metrics = state.metrics
@@ -282,6 +288,12 @@ def _asks_again(state: MonitorState, action: LanguageAction) -> bool:
     number, status = state.status
     done = number == action.n and status in TERMINAL_STATES
     return done and action.tool != "double_check" and not action.confirmed
+
+
+def _stands(state: MonitorState) -> bool:
+    """Whether the floor may carry an aircraft: it takes off, or could not and never moved."""
+    never_moved = state.metrics.path_length == 0.0
+    return state.takeoff == "moving" or (state.takeoff == "failed" and never_moved)
 
 
 def _collision_force(contacts: ContactResults, *, carried: bool) -> float:

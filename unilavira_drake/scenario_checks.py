@@ -25,7 +25,6 @@ from unilavira_drake.mllm.latency import (
 from unilavira_drake.mllm.preset import PROMPT_PRESETS
 from unilavira_drake.people.crowd import make_crowd, with_people
 from unilavira_drake.robots.flight_config import FlightConfig
-from unilavira_drake.robots.robot import GroundRobot
 from unilavira_drake.scenario import (
     ABLATIONS,
     GROUNDERS,
@@ -35,10 +34,9 @@ from unilavira_drake.scenario import (
     robot_kinds,
 )
 from unilavira_drake.sensors.exposure_config import EXPOSURES
-from unilavira_drake.task_choice import choose_task
+from unilavira_drake.task_choice import choose_task, start_pose
 from unilavira_drake.tasks import FAMILIES, checked_task, success_rule
 from unilavira_drake.worlds.load import load_world
-from unilavira_drake.worlds.start import parse_start_pose
 from unilavira_drake.worlds.world import World
 
 _MAX_IMAGE = 4096
@@ -131,16 +129,10 @@ def validate(scenario: Scenario) -> None:
     _check_periods(scenario)
     _check_tasks(scenario)
     world = load_world(scenario.world.name, mirror=scenario.world.mirror)
-    text = choose_task(scenario).start
-    start = parse_start_pose(
-        text,
-        world,
-        radius=scenario.robot.turning_radius,
-        climbs=scenario.robot.leaves_the_ground,
-        flies=scenario.robot.flies,
-    )
+    start = start_pose(scenario, world)
     if scenario.robot.flies:
-        _check_air_start(text, start, scenario.flight.within(mirrored=world.mirrored))
+        flight = scenario.flight.mirrored_if(world.mirrored)
+        _check_air_start(choose_task(scenario).start, start, flight)
     _check_people(scenario, world, start[:2])
 
 
@@ -229,7 +221,7 @@ def _check_order(scenario: Scenario) -> None:
 
 def _check_people(scenario: Scenario, world: World, robot: tuple[float, float]) -> None:
     people = scenario.people
-    if people.count and not isinstance(scenario.robot, GroundRobot):
+    if people.count and scenario.robot.flies:
         raise ScenarioError(
             f"people.count: {people.count} people, but only robots on the ground know of people; "
             "set it to 0, or choose such a robot."

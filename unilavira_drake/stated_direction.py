@@ -13,6 +13,14 @@ from unilavira_drake.messages import Message
 
 _NUMBER = r"(\d{1,3}(?:,\d{3})+(?:\.\d+)?|\d+(?:\.\d+)?)"
 _DISTANCE = re.compile(rf"(?<![\d.,]){_NUMBER} ?(?:m|meters?|metres?)\b")
+_SIZE_BEFORE = re.compile(
+    r"\b(?:height|altitude|width|length)(?: of)?(?: about)? $"
+    r"|\b(?:climb|rise|ascend|descend|sink)(?:s|ing)?(?: to| by)?(?: about)? $"
+)
+_SIZE_AFTER = re.compile(
+    r" (?:(?:in|of) )?(?:height|high|altitude|tall|long|length|wide|width|deep|above)\b"
+)
+"""A length that these words stand at is none between the start and the place."""
 _ANGLE = re.compile(
     rf"(-?){_NUMBER} ?(?:degrees?|deg|°)(?: (?:to|on|from|at) (?:the|your|you))?(?: (left|right))?"
 )
@@ -43,23 +51,32 @@ def stated_direction(task: str) -> StatedDirection | None:
     """Returns the place that a task states by distance and angle, or None where it states none.
 
     An angle without a side counts to the right, as OpenUAV's yaw does.  An order (``fly 40 m
-    ahead``) states no place.  Of several distances that counts which stands nearest to the bearing.
+    ahead``) states no place.  Of several distances that counts which stands nearest to the bearing;
+    heights and sizes are none.
     """
     for sentence in re.split(r"(?<=[.;!?])\s+", task.lower()):
         bearing = _bearing(sentence)
         if bearing is None or not _STATES.search(sentence):
             continue
-        degrees, where = bearing
-        distance = _nearest(sentence, where)
+        degrees, span = bearing
+        distance = _nearest(sentence, span)
         if distance is not None:
             return StatedDirection(distance, degrees)
     return None
 
 
-def _nearest(sentence: str, where: int) -> float | None:
-    """Returns the distance that stands nearest to a place of a sentence, metres."""
+def _nearest(sentence: str, span: tuple[int, int]) -> float | None:
+    """Returns the distance that stands nearest to a span of a sentence, metres."""
+    distances = (
+        match
+        for match in _DISTANCE.finditer(sentence)
+        if not _SIZE_AFTER.match(sentence, match.end())
+        and not _SIZE_BEFORE.search(sentence[: match.start()])
+    )
     nearest = min(
-        _DISTANCE.finditer(sentence), key=lambda match: abs(match.start() - where), default=None
+        distances,
+        key=lambda match: max(span[0] - match.end(), match.start() - span[1]),
+        default=None,
     )
     return None if nearest is None else _number(nearest.group(1))
 
@@ -68,17 +85,22 @@ def _number(digits: str) -> float:
     return float(digits.replace(",", ""))
 
 
-def _bearing(sentence: str) -> tuple[float, int] | None:
-    """Returns degrees to the left, and where in the sentence they stand."""
+def _bearing(sentence: str) -> tuple[float, tuple[int, int]] | None:
+    """Returns degrees to the left, and the span of the sentence where they stand."""
     angle = _ANGLE.search(sentence)
     if angle is not None:
         sign = 1.0 if angle.group(3) == "left" else -1.0
         degrees = _number(angle.group(2))
-        return (-sign if angle.group(1) else sign) * degrees, angle.start()
+        return (-sign if angle.group(1) else sign) * degrees, angle.span()
     little = _A_LITTLE.search(sentence)
     if little is not None and "ahead" in sentence:
-        return (SLIGHT if "left" in little.group() else -SLIGHT), sentence.index("ahead")
+        return (SLIGHT if "left" in little.group() else -SLIGHT), _span(sentence, "ahead")
     return next(
-        ((value, sentence.index(words)) for words, value in _PLAIN.items() if words in sentence),
+        ((value, _span(sentence, words)) for words, value in _PLAIN.items() if words in sentence),
         None,
     )
+
+
+def _span(sentence: str, words: str) -> tuple[int, int]:
+    begin = sentence.index(words)
+    return begin, begin + len(words)

@@ -16,7 +16,6 @@ from unilavira_drake.people.crowd import Person, make_crowd, with_people
 from unilavira_drake.raster import raster_works
 from unilavira_drake.robots.actuation import add_actuation, set_start
 from unilavira_drake.robots.planar_base import HEIGHT_JOINT
-from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.robots.quadrotor_actuation import add_landing_ground
 from unilavira_drake.robots.robot_model import add_robot_model
 from unilavira_drake.robots.terrain import follow_terrain
@@ -30,10 +29,9 @@ from unilavira_drake.station_cameras import (
     add_scene_cameras,
     add_scene_sensors,
 )
-from unilavira_drake.task_choice import choose_task
+from unilavira_drake.task_choice import start_pose
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.scenery import add_scenery, lights
-from unilavira_drake.worlds.start import parse_start_pose
 from unilavira_drake.worlds.world import World
 
 
@@ -111,12 +109,7 @@ def make_navigation_station(
     if world is None:
         world = load_world(scenario.world.name, mirror=scenario.world.mirror)
     if start is None:
-        x, y, start_height, yaw = parse_start_pose(
-            choose_task(scenario).start,
-            world,
-            radius=scenario.robot.turning_radius,
-            climbs=scenario.robot.leaves_the_ground,
-        )
+        x, y, start_height, yaw = start_pose(scenario, world)
         start = (x, y, yaw)
     builder = DiagramBuilder()
     world = with_people(world, scenario.people)
@@ -160,7 +153,7 @@ def make_navigation_station(
 
 
 def _wind(scenario: Scenario, world: World) -> WindModel:
-    wind = scenario.flight.within(mirrored=world.mirrored).wind
+    wind = scenario.flight.mirrored_if(world.mirrored).wind
     return WindModel(
         wind.speed,
         math.radians(wind.direction_degrees),
@@ -177,7 +170,7 @@ def _add_scene(
     plant, scene_graph = AddMultibodyPlant(plant_config(scenario), builder)
     ground = add_scenery(plant, scene_graph, world)
     model_instance = add_robot_model(plant, scenario.robot)
-    if isinstance(scenario.robot, Quadrotor):
+    if scenario.robot.flies:
         add_landing_ground(plant)
     add_people(plant, scene_graph, people)
     if plant.HasJointNamed(HEIGHT_JOINT, model_instance):

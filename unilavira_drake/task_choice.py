@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from unilavira_drake.errors import ScenarioError, TaskError, unknown_name
 from unilavira_drake.scenario import Budgets, NamedTask, Scenario
 from unilavira_drake.tasks import SuccessRule, TaskSpec, checked_task, success_rule
+from unilavira_drake.worlds.start import parse_start_pose
+from unilavira_drake.worlds.world import World
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,23 @@ def choose_task(scenario: Scenario) -> EpisodeTask:
         answers=(task.answer, *task.accept) if task.answer else (),
         rule=success_rule(spec.family, task.protocol),
         budgets=_budgets(scenario.budgets, spec),
+    )
+
+
+def start_pose(scenario: Scenario, world: World) -> tuple[float, float, float, float]:
+    """Returns where the scenario's robot begins its chosen task: see :func:`parse_start_pose`.
+
+    Raises:
+        ScenarioError: as :func:`choose_task`.
+        TaskError: as :func:`choose_task`, and for a place where this robot cannot start.
+    """
+    robot = scenario.robot
+    return parse_start_pose(
+        choose_task(scenario).start,
+        world,
+        radius=robot.turning_radius,
+        climbs=robot.leaves_the_ground,
+        flies=robot.flies,
     )
 
 

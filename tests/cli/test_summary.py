@@ -94,9 +94,16 @@ def test_an_answer_is_no_markup_and_no_command_to_the_terminal(answer: str) -> N
 
 
 def test_a_flight_has_a_path_type_and_no_room() -> None:
-    flown = dataclasses.replace(ANSWERED, metrics=MetricsResult(path_type="hard"))
-    assert row(printed(flown), "path type") == "hard"
-    assert "stopped within 3 m" not in printed(flown)
+    task = TaskResult("aerial_vln")
+    # Without a score or a reference way there is no path type.
+    for path_type in ("hard", None):
+        metrics = MetricsResult(path_type=path_type)
+        flown = dataclasses.replace(ANSWERED, task=task, metrics=metrics)
+        text = printed(flown)
+        assert row(text, "path type") == (path_type or "-")
+        for name in ("in the goal's room", "goal in the last view", "stopped within 3 m"):
+            assert name not in text
+            assert name in printed(ANSWERED)
     assert "path type" not in printed(ANSWERED)
 
 

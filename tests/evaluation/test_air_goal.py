@@ -12,6 +12,7 @@ from unilavira_drake.evaluation.scoring import GoalField, score, shortest_path
 from unilavira_drake.messages import Panorama
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.tasks import success_rule
+from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.world import Box, LabelEntry, Room, World, WorldObject
 
 HOME = success_rule("aerial_vln")
@@ -139,3 +140,16 @@ def test_robots_on_the_ground_are_scored_over_the_floor():
     assert type(ground) is GoalField
     assert ground.fields[0].space.resolution == 0.25
     assert ground.distance(105.0 + 20.0, 50.0) == pytest.approx(19.5, abs=0.6)
+
+
+def test_in_a_house_each_floor_has_its_own_goals():
+    house = load_world("two_storey")
+    both = make_goal("toilet_1|kitchen", house, HOME, radius=0.3)
+    for elevation, name in ((2.8, "toilet_1"), (0.0, "kitchen")):
+        alone = make_goal(name, house, HOME, radius=0.3)
+        here = both.on(elevation)
+        assert [target.text for target in here.targets] == [name]
+        assert here.places == alone.places == alone.on(elevation).places
+        assert here.distance(2.0, 2.0, 1.2) == alone.distance(2.0, 2.0, 1.2)
+        assert len(success_area(here, HOME)) == 1
+        assert success_area(alone.on(2.8 - elevation), HOME) == ()

@@ -90,7 +90,8 @@ def test_what_lies_on_another_floor_is_told_from_the_way() -> None:
     assert (list(upper.waypoints), list(lower.waypoints)) == ([2, 3], [1])
     assert (upper.goals, lower.goals) == ([(5.0, 1.0), (6.0, 1.0)], [(2.0, 1.0)])
     assert upper.ends[0] is None
-    assert lower.ends[0] == (1.0, 1.0, 0.0)
+    assert upper.ends[1] == trace.ends[1] == (5.0, 1.0, 0.0)
+    assert lower.ends == ((1.0, 1.0, 0.0), None)
     assert np.array_equal(upper.points, trace.points)
     assert map_picture(WORLD, upper) != map_picture(WORLD, trace)
 

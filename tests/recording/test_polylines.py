@@ -33,6 +33,11 @@ def test_what_is_cut_out_and_what_is_left_are_the_whole(a: float, b: float) -> N
     assert total + (end - begin) == pytest.approx(10.0, abs=1e-9)
 
 
+def test_nothing_is_left_before_a_cut_at_the_beginning() -> None:
+    (left,) = without(STRAIGHT, ((0.0, 4.0),))
+    np.testing.assert_array_equal(left, STRAIGHT[4:])
+
+
 def test_a_lane_is_to_the_left_and_joins_the_ends() -> None:
     lane = beside(STRAIGHT, 0.2)
     np.testing.assert_allclose(lane[[0, -1]], STRAIGHT[[0, -1]])

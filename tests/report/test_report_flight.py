@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,9 @@ from unilavira_drake.messages import (
     VoxelMap,
 )
 from unilavira_drake.messages.voxels import TILE
+from unilavira_drake.recording.result import EpisodeResult, MetricsResult, TaskResult
 from unilavira_drake.recording.run_folder import RunFolder
+from unilavira_drake.report.figures import run_figures
 from unilavira_drake.report.model import read_run
 from unilavira_drake.report.page import render_report
 
@@ -76,3 +79,13 @@ def test_the_map_is_there_and_the_goals_are_read_back(folder: Path) -> None:
     assert first.goal.p_WT == (1.0, 1.0, 0.0)
     assert second.goal.partial
     assert "data:image/png" in render_report(folder)
+
+
+@pytest.mark.parametrize(("family", "flight"), [("aerial_vln", True), ("vln", False)])
+def test_the_figures_of_a_flight_are_not_those_of_a_room(
+    folder: Path, family: str, flight: bool
+) -> None:
+    result = EpisodeResult(task=TaskResult(family), metrics=MetricsResult(path_type="easy"))
+    figures = dict(run_figures(dataclasses.replace(read_run(folder), result=result)))
+    assert figures.get("path type") == ("easy" if flight else None)
+    assert ("in the goal's room" in figures) is ("goal in the last view" in figures) is not flight

@@ -15,6 +15,7 @@ from unilavira_drake.recording.run_folder import RunFolder
 from unilavira_drake.report.model import read_run
 from unilavira_drake.report.page import render_report
 from unilavira_drake.report.setting import read_setting
+from unilavira_drake.report.sheet import Sheet
 from unilavira_drake.scenario_loading import dump_scenario, load_scenario
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.worlds.load import load_world
@@ -22,13 +23,12 @@ from unilavira_drake.worlds.load import load_world
 FLOORS = ((7.0, 1.2, 0.0), (7.0, 8.0, 2.8), (8.0, 8.0, 2.8))
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("storeys") / "run"
+def write(path: Path, floors: tuple[tuple[float, float, float], ...], last: float = 0.0) -> Path:
+    """Writes a run with a panorama at each place; its end lies ``last`` metres higher."""
     with RunFolder(path) as run:
         run.write("scenario.yaml", dump_scenario(load_scenario("two_storey")))
         pen = Pen(run)
-        for n, (x, y, z) in enumerate(FLOORS, start=1):
+        for n, (x, y, z) in enumerate(floors, start=1):
             X_WB = pose(x, y, 1.57)
             X_WB[2, 3] = z
             pen.say("observer", "panorama", Panorama(n, n, 0.1, X_WB, (), Outcome()))
@@ -38,7 +38,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             for _ in range(2):
                 pen.say("episode_monitor", "metrics", EpisodeMetrics(x=x, y=y, z=z))
                 x += 0.1
+        if last:
+            pen.say("episode_monitor", "metrics", EpisodeMetrics(x=x, y=y, z=z + last))
     return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(tmp_path_factory.mktemp("storeys") / "run", FLOORS)
 
 
 def test_each_step_lies_on_the_plan_of_its_floor(folder: Path) -> None:
@@ -71,3 +78,22 @@ def test_the_goal_lies_on_its_own_floor(folder: Path) -> None:
         (target,) = goal.on(elevation).targets
         assert target.elevation == elevation
         assert room in target.rooms
+
+
+def test_a_step_shows_the_way_before_it_on_its_own_floor_alone(folder: Path) -> None:
+    run = read_run(folder)
+    sheet = Sheet(run, read_setting(folder, None))
+    first, _, third = (sheet.overlay(step, "") for step in run.steps)
+    assert (first.floor, first.way, third.floor) == ("", (), "2")
+    (way,) = third.way
+    # The last place downstairs, two upstairs and where this step begins.
+    assert len(way.split()) == 4
+    assert f'<polyline class="way" points="{way}"/>' in render_report(folder)
+
+
+def test_an_end_on_another_floor_is_not_drawn(tmp_path: Path) -> None:
+    for last, drawn in ((0.0, True), (2.8, False)):
+        path = write(tmp_path / f"{last}", FLOORS[:1], last)
+        start, end = Sheet(read_run(path), read_setting(path, None)).ends()
+        assert start
+        assert bool(end) is drawn

@@ -36,12 +36,12 @@ def test_a_start_outside_the_airspace_is_refused(flight, words):
 def test_fence_and_wind_are_mirrored_with_the_world():
     wind = WindConfig(speed=2.0, direction_degrees=30.0, gusts=1.0)
     flight = FlightConfig(geofence=[0.0, 1.0, 5.0, 9.0], wind=wind)
-    assert flight.within(mirrored=False) is flight
-    mirrored = flight.within(mirrored=True)
+    assert flight.mirrored_if(False) is flight
+    mirrored = flight.mirrored_if(True)
     assert mirrored.geofence == [0.0, -9.0, 5.0, -1.0]
     assert mirrored.wind == WindConfig(speed=2.0, direction_degrees=-30.0, gusts=1.0)
-    assert mirrored.within(mirrored=True) == flight
-    assert FlightConfig().within(mirrored=True).geofence == []
+    assert mirrored.mirrored_if(True) == flight
+    assert FlightConfig().mirrored_if(True).geofence == []
 
 
 def test_a_start_in_a_mirrored_world_is_seen_within_the_mirrored_fence():

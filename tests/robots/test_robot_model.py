@@ -71,3 +71,17 @@ def test_a_file_of_two_models_is_refused(plant: MultibodyPlant, tmp_path: Path) 
     path.write_text(f"directives:\n{models}")
     with pytest.raises(ScenarioError, match="holds 2 models; give it just one"):
         add_robot_model(plant, CobotMagic(model=str(path)))
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        "package://nope/x.sdf",
+        "package://unilavira_drake/robots/nope.sdf",
+        "http://localhost/x.sdf",
+        "nope.sdf",
+    ],
+)
+def test_a_file_that_is_not_there_is_told(plant: MultibodyPlant, model: str) -> None:
+    with pytest.raises(ScenarioError, match=rf"^robot\.model: .*{re.escape(model)}"):
+        add_robot_model(plant, CobotMagic(model=model))

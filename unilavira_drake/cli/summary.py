@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from unilavira_drake.messages.metrics import CAUSES
-from unilavira_drake.recording.result import EpisodeResult, MetricsResult
+from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.report.figures import cost_figures, judge_figures
 from unilavira_drake.scenario import Scenario
 
@@ -60,7 +60,7 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
     metrics, counts = result.metrics, result.counts
     rows = [
         ("navigation error", _metres(metrics.navigation_error_m)),
-        *_where(metrics),
+        *_where(result),
         ("path length", _metres(metrics.path_length_m)),
         ("shortest path", _metres(metrics.shortest_path_m)),
         ("SPL", "-" if metrics.spl is None else f"{metrics.spl:.2f}"),
@@ -84,10 +84,11 @@ def _figures(result: EpisodeResult) -> list[tuple[str, str]]:
     return [*rows, *judge_figures(result), *cost_figures(result.usage)]
 
 
-def _where(metrics: MetricsResult) -> list[tuple[str, str]]:
+def _where(result: EpisodeResult) -> list[tuple[str, str]]:
     """A flight has a path type; room, view and 3 m have no part in its success."""
-    if metrics.path_type is not None:
-        return [("path type", metrics.path_type)]
+    metrics = result.metrics
+    if result.task.is_flight:
+        return [("path type", metrics.path_type or "-")]
     return [
         ("in the goal's room", _YES_NO[metrics.same_room]),
         ("goal in the last view", _YES_NO[metrics.goal_seen]),

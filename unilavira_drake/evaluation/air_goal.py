@@ -75,6 +75,13 @@ class AirGoal(GoalField):
             for boxes in self.boxes
         )
 
+    def _with(self, kept: list[int]) -> AirGoal:
+        return dataclasses.replace(
+            self,
+            targets=tuple(self.targets[i] for i in kept),
+            boxes=tuple(self.boxes[i] for i in kept),
+        )
+
     @functools.cached_property
     def _space(self) -> FlightSpace:
         return air_space(self.world, radius=self.radius)

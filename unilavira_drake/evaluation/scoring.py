@@ -54,12 +54,7 @@ class GoalField(Message):
         if len(self.world.elevations) < 2:
             return self
         kept = [i for i, target in enumerate(self.targets) if target.elevation == elevation]
-        return dataclasses.replace(
-            self,
-            targets=tuple(self.targets[i] for i in kept),
-            fields=tuple(self.fields[i] for i in kept),
-            ways=tuple(self.ways[i] for i in kept),
-        )
+        return self._with(kept)
 
     def distances(self, x: float, y: float, z: float = 0.0) -> tuple[float, ...]:
         """Returns the geodesic distance to each alternative, metres; inf where there is no way."""
@@ -89,6 +84,15 @@ class GoalField(Message):
         """Returns how hard a way of this length is called; None on the ground."""
         del way
         return None
+
+    def _with(self, kept: list[int]) -> GoalField:
+        """Returns the goal with some of its alternatives."""
+        return dataclasses.replace(
+            self,
+            targets=tuple(self.targets[i] for i in kept),
+            fields=tuple(self.fields[i] for i in kept),
+            ways=tuple(self.ways[i] for i in kept),
+        )
 
 
 @dataclass(frozen=True)

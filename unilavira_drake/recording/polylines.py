@@ -24,7 +24,7 @@ def without(way: Way, spans: tuple[tuple[float, float], ...]) -> tuple[Way, ...]
     pieces, begin = [], -np.inf
     for span_begin, span_end in (*sorted(spans), (np.inf, np.inf)):
         piece = stretch(way, begin, span_begin)
-        if len(piece) > 1:
+        if len(piece) > 1 and piece[-1, 0] > piece[0, 0]:
             pieces.append(piece)
         begin = span_end
     return tuple(pieces)

@@ -28,6 +28,11 @@ class TaskResult:
     protocol: str = ""
     """How its stop was judged, see ``tasks.SuccessRule``."""
 
+    @property
+    def is_flight(self) -> bool:
+        """Whether the task is a flight directive, whatever came of it."""
+        return self.family == "aerial_vln"
+
 
 @dataclass(frozen=True)
 class ModelResult:

@@ -55,14 +55,15 @@ class EpisodeTrace:
     def ends(self) -> tuple[Pose | None, Pose | None]:
         """Where the way begins and ends, each along the front of the nearest panorama.
 
-        None before the first panorama, and where it begins on a floor that is not shown.
+        None before the first panorama, and where it lies on a floor that is not shown.
         """
         if not self.poses:
             return None, None
         first, last = self.poses[min(self.poses)], self.poses[max(self.poses)]
         x, y = self._points[-1][1:3] if self._points else last[:2]
-        elsewhere = self.away and self.away[0][0] <= self._points[0][0]
-        return None if elsewhere else first, (x, y, last[2])
+        begins_away = self.away and self.away[0][0] <= self._points[0][0]
+        ends_away = self.away and self.away[-1][1] >= self._points[-1][0]
+        return None if begins_away else first, None if ends_away else (x, y, last[2])
 
     def height(self, n: int) -> float:
         """Returns the height at panorama n, or at the latest one before it, metres."""

@@ -66,12 +66,17 @@ def _scores(result: EpisodeResult) -> Rows:
     answer = []
     if metrics.answer is not None:
         answer = [("answer", metrics.answer), ("answer correct", _WORDS[metrics.answer_correct])]
+    where = [
+        ("in the goal's room", _WORDS[metrics.same_room]),
+        ("goal in the last view", _WORDS[metrics.goal_seen]),
+    ]
+    if result.task.is_flight:  # Room and view have no part in its success.
+        where = [("path type", metrics.path_type or "–")]
     return (
         *answer,
         *judge_figures(result),
         ("navigation error", metres(metrics.navigation_error_m)),
-        ("in the goal's room", _WORDS[metrics.same_room]),
-        ("goal in the last view", _WORDS[metrics.goal_seen]),
+        *where,
         ("path length", metres(metrics.path_length_m)),
         ("shortest path", metres(metrics.shortest_path_m)),
         ("SPL", "–" if metrics.spl is None else f"{metrics.spl:.2f}"),

@@ -78,8 +78,8 @@ class Overlay:
     """The name of the floor on which the step begins."""
     occupancy: tuple[str, float, float, float, float] | None = None
     """Data URI, x, y, width and height."""
-    way: str = ""
-    """Before this step."""
+    way: tuple[str, ...] = ()
+    """Before this step, on its floor; in pieces."""
     leg: str = ""
     """That this step's action drove."""
     back: bool = False
@@ -134,20 +134,22 @@ class Sheet:
         back = step.action is not None and step.action.tool == "backtrack"
         pose = self._trace.poses.get(step.n)
         floor = self._name(self._trace.height(step.n))
+        part = self._parts.get(floor, self._trace)
+        before = without(stretch(points, -math.inf, decided), part.away)
         p_WG = step.goal.p_WG if step.goal is not None else None
         aim = self._point(*p_WG[:2]) if p_WG is not None else None
         here = self._point(*pose[:2]) if pose is not None else None
         return Overlay(
             floor=floor,
             occupancy=self._placed(step, occupancy),
-            way=self._points(stretch(points, -math.inf, decided)[:, 1:]),
+            way=tuple(self._points(piece[:, 1:]) for piece in before),
             leg=self._points((beside(leg, self._lane) if back else leg)[:, 1:]),
             back=back,
             cone=self._cone(step, pose),
             pose="" if pose is None else self._arrow(*pose),
             aim=aim,
             sight="" if aim is None or here is None else f"{here[0]},{here[1]} {aim[0]},{aim[1]}",
-            waypoints=self._waypoints(self._parts.get(floor, self._trace), step.n),
+            waypoints=self._waypoints(part, step.n),
         )
 
     def timed_way(self) -> tuple[tuple[str, str, bool], ...]:

@@ -52,9 +52,9 @@ class FlightConfig:
     rest_period: float = 2.0
     wind: WindConfig = dc.field(default_factory=WindConfig)
 
-    def within(self, *, mirrored: bool) -> "FlightConfig":
+    def mirrored_if(self, world_is_mirrored: bool) -> "FlightConfig":
         """Returns what holds in the world itself: in a mirrored one fence and wind are, too."""
-        if not mirrored:
+        if not world_is_mirrored:
             return self
         fence = self.geofence
         return dc.replace(

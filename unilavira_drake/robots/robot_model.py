@@ -31,10 +31,10 @@ def add_robot_model(plant: MultibodyPlant, robot: Robot) -> ModelInstanceIndex:
     parser = Parser(plant)
     parser.package_map().AddPackageXml(package_xml())
     known = "://" in model
-    path = Path(parser.package_map().ResolveUrl(model) if known else model)
-    if not path.is_file():
-        raise ScenarioError(f"robot.model: no file {model!r}; check the path.")
     try:
+        path = Path(parser.package_map().ResolveUrl(model) if known else model)
+        if not path.is_file():
+            raise ScenarioError(f"robot.model: no file {model!r}; check the path.")
         if robot.can_climb:
             found = parser.AddModelsFromString(climbing_model(path), "sdf")
         else:
