@@ -14,6 +14,8 @@ from unilavira_drake.mapping.moving_things import (
     BESIDE,
     BODY,
     ELSEWHERE,
+    LEAST_PIXELS,
+    LONGEST_GAP,
     STOOD,
     Look,
     cells_around,
@@ -73,11 +75,22 @@ def test_the_middle_of_who_is_seen(x, y):
 
 
 def test_who_stands_beside_the_robot_is_remembered_out_of_view():
-    standing = [look(0.1 * k, (ANNA, 1.0, 0.3)) for k in range(5)]
+    standing = [look(0.1 * k, (ANNA, 1.0, 0.3)) for k in range(7)]
     # It looks away; nothing tells that she has gone.
     away = look(1.0, yaw=math.pi / 2)
-    assert known(*standing, away, until=0.4 + STOOD - 0.1)
-    assert not known(*standing, away, until=0.4 + STOOD + 0.1)
+    assert known(*standing, away, until=0.6 + STOOD - 0.1)
+    assert not known(*standing, away, until=0.6 + STOOD + 0.1)
+
+
+def test_who_is_glimpsed_once_is_not_taken_for_standing():
+    # Somebody who walks by: before the first look, and between looks far apart, nobody knows.
+    glimpse = look(0.0, (ANNA, 1.0, 0.3))
+    again = [look(0.1 * k, (ANNA, 1.0, 0.3)) for k in range(7)]
+    later = look(0.6 + LONGEST_GAP + 0.1, (ANNA, 1.0, 0.3))
+    for looks in ((glimpse,), (*again, later)):
+        last = looks[-1].time
+        assert known(*looks, until=last + ELSEWHERE - 0.1)
+        assert not known(*looks, until=last + ELSEWHERE + 0.1)
 
 
 def test_who_walks_or_is_farther_off_is_forgotten_sooner():
@@ -117,6 +130,49 @@ def test_somebody_before_her_place_tells_nothing_of_it():
 def test_who_is_seen_elsewhere_is_no_more_where_they_were():
     (anna,) = known(look(0.0, (ANNA, 1.5, 0.5)), look(1.0, (ANNA, 0.5, 1.5), yaw=math.pi / 2))
     assert anna.position == pytest.approx((0.5, 1.5), abs=0.15)
+
+
+def only(one, shown):
+    """A look in which something hides people but for these pixels."""
+    before = (one.labels != 0) & ~shown
+    depth = np.where(before, np.float32(0.5), one.view.depth)
+    labels = np.where(before, np.int16(0), one.labels)
+    return Look(dc.replace(one.view, depth=depth), labels, one.time)
+
+
+def test_the_head_alone_over_a_shelf_is_enough():
+    rows = np.indices((LENS.height, LENS.width))[0]
+    # Of her, only what is higher than the map's band.
+    head = rows < LENS.cy - 0.45 / 1.2 * LENS.fy
+    (anna,) = known(look(0.0, (ANNA, 1.4, 0.0)), only(look(0.1, (ANNA, 1.4, 0.2)), head))
+    assert anna.time == 0.1
+    assert anna.position == pytest.approx((1.4, 0.2), abs=0.15)
+    assert not len(anna.cells)
+    map_ = OccupancyMap(1, 1, 0.0, 0.05, (0.0, -2.0), np.full((80, 80), -20, np.int8))
+    assert with_moving(map_, (anna,), PARAMETERS, 0.0).log_odds.max() == PARAMETERS.newest
+
+
+def test_who_is_out_of_range_or_on_another_storey_is_no_more_where_they_were():
+    seen = look(0.0, (ANNA, 1.4, 0.0))
+    short = dc.replace(PARAMETERS, max_range=2.0)
+    for parameters, floor_height in ((short, 0.0), (PARAMETERS, 3.0)):
+        things = known(seen)
+        one = look(0.1, (ANNA, 2.5, 0.0))
+        assert not remembered(
+            things, (one,), parameters, robot=(0.0, 0.0), floor_height=floor_height, time=0.1
+        )
+
+
+def test_a_few_pixels_move_nobody():
+    seen, other = look(0.0, (ANNA, 1.2, 0.0)), look(0.1, (ANNA, 2.0, 1.0))
+    few = np.zeros(other.labels.shape, bool)
+    few[tuple(np.argwhere(other.labels == ANNA).T[:, : LEAST_PIXELS // 2])] = True
+    stray = Look(seen.view, np.where(few, other.labels, np.int16(0)), 0.1)
+    assert (stray.labels == ANNA).any()
+    (anna,) = known(seen, stray)
+    assert anna.position == pytest.approx((1.2, 0.0), abs=0.15)
+    assert anna.time == 0.0
+    assert not known(stray)
 
 
 @pytest.mark.parametrize("turn", [-45.0, 45.0])

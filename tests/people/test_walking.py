@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 
 import pytest
 
 from unilavira_drake.people.crowd import RADIUS, Person
-from unilavira_drake.people.walking import AHEAD, Manners, RobotSeen, Walker, next_step, swing
+from unilavira_drake.people.walking import (
+    ACCELERATION,
+    AHEAD,
+    Manners,
+    RobotSeen,
+    Walker,
+    _covered,
+    next_step,
+    swing,
+)
 
 PERSON = Person(
     "person_1", 7, "red", walk=((0.0, 0.0), (4.0, 0.0), (4.0, 2.0)), speed=1.0, pauses=(2.0, 3.0)
@@ -142,6 +152,60 @@ def test_polite_people_give_way_along_their_walk_to_a_robot_that_does_not_see_th
     # No farther than it takes, and there they rest on.
     assert walk.pose[0] < 0.5
     assert walk.moving == 0.0
+
+
+def test_who_gives_way_backwards_comes_to_a_stand_first():
+    walk = Walk(dataclasses.replace(PERSON, walk=((0.0, 0.0), (100.0, 0.0)), speed=1.2))
+    walk.go(2.0)
+    x = walk.pose[0]
+    # It crosses their way just ahead.
+    robot = RobotSeen(x + 0.62, 0.55, -math.pi / 2, 0.35, 0.28, 0.0, -0.8)
+    walk.go(0.6, robot=dataclasses.astuple(robot))
+    assert walk.walker.way == -1
+    xs = [x, *(pose[0] for pose in walk.trace[-12:])]
+    speeds = [(b - a) / PERIOD for a, b in itertools.pairwise(xs)]
+    # No faster than they brake, through a stand and then back at half their speed.
+    changes = [b - a for a, b in itertools.pairwise([1.2, *speeds])]
+    assert min(changes) > -2.0 * ACCELERATION * PERIOD - 1e-9
+    assert min(map(abs, speeds)) < ACCELERATION * PERIOD
+    assert speeds[-1] < 0.0
+    assert min(speeds) >= -0.5 * 1.2 - 1e-9
+
+
+def test_nobody_changes_velocity_faster_than_they_brake_at_the_ends_of_the_walk():
+    walk = Walk(dataclasses.replace(PERSON, walk=((0.0, 0.0), (3.0, 0.0)), pauses=(0.5,)))
+    walk.go(20.0)
+    xs = [pose[0] for pose in walk.trace]
+    speeds = [(b - a) / PERIOD for a, b in itertools.pairwise(xs)]
+    assert min(speeds) < -0.9
+    changes = [abs(b - a) for a, b in itertools.pairwise(speeds)]
+    assert max(changes) < 2.0 * ACCELERATION * PERIOD + 1e-9
+
+
+@pytest.mark.parametrize(("yaw", "pace"), [(0.0, 1.0), (1.2, 0.5), (math.pi, 0.5)])
+def test_the_speed_of_who_gives_way_follows_how_they_face(yaw, pace):
+    # It comes from behind, and they rest.
+    person = dataclasses.replace(PERSON, walk=((0.0, 0.0), (100.0, 0.0)), delay=99.0)
+    walk = Walk(person)
+    walk.pose = (0.0, 0.0, yaw)
+    robot, x = RobotSeen(-0.65, 0.0, 0.0, 0.35, 0.28, 0.3, 0.0), []
+    for _ in range(24):
+        walk.go(PERIOD, robot=dataclasses.astuple(robot))
+        robot = dataclasses.replace(robot, x=walk.pose[0] - 0.65)
+        x.append(walk.pose[0])
+    assert (x[-1] - x[-2]) / PERIOD == pytest.approx(pace)
+
+
+@pytest.mark.parametrize("speed", [-1.2, -0.4, 0.0, 0.3, 0.5, 1.2])
+def test_the_way_that_is_foreseen_is_the_one_that_is_walked(speed):
+    # Backwards: half of 1 m/s; a step of a millisecond is the oracle.
+    x, v, step = 0.0, speed, 0.001
+    for k in range(1, 1001):
+        rate = ACCELERATION if 0.0 <= v < 0.5 else 2.0 * ACCELERATION
+        v = v + min(max(0.5 - v, -rate * step), rate * step)
+        x += v * step
+        if k % 250 == 0:
+            assert _covered(speed, 0.5, k * step) == pytest.approx(x, abs=0.003)
 
 
 def test_nobody_walks_along_close_beside_a_robot_that_drives():

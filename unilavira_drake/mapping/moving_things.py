@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 
 from unilavira_drake.mapping.depth_view import DepthView, fault_of
 from unilavira_drake.mapping.occupancy import MappingParameters
+from unilavira_drake.mapping.storeys import SAME_STOREY
 from unilavira_drake.messages import Message, read_only
 
+LEAST_PIXELS = 60
+"""Who shows fewer is not seen."""
 LABELS = 32768
 """Render labels are below this."""
 BODY = 0.25
@@ -36,9 +39,12 @@ would turn back on its way round them."""
 ELSEWHERE = 4.0
 """All others are remembered for so long, seconds."""
 STRAY, STILL = 0.15, 0.5
-"""Who leaves a place by more than these metres walks, until they stay for so many seconds."""
+"""Who leaves a place by more than these metres walks, until they stay for so many seconds; so does
+who was just met."""
 LONGEST_GAP = 1.6
 """Nobody knows what somebody did between looks farther apart than this, seconds."""
+TALLEST = 2.1
+"""Nobody is taller than this, metres."""
 HEIGHTS = (0.6, 0.9, 1.2)
 """A place is seen empty where the camera looks past it at one of these, metres above the floor,"""
 PAST = 0.30
@@ -76,7 +82,7 @@ class MovingThing(Message):
     """Where it stays or was last seen to leave, metres, ..."""
     since: float
     """... and since when, seconds."""
-    walks: bool = False
+    walks: bool = True
 
     def forgotten(self, robot: Point, time: float) -> bool:
         """Whether it was seen too long ago for where the robot is."""
@@ -90,7 +96,10 @@ class _Sighting:
     label: int
     pixels: int
     position: Point
+    height: float
+    """Median of what is seen, above the floor under the robot, metres."""
     cells: Cells
+    """Of what is seen within the map's range and heights."""
     time: float
 
 
@@ -144,8 +153,8 @@ def remembered(
         and not any(_seen_past(look, thing, parameters) for look in believed)
     }
     for label, sighting in best.items():
-        # Who is out of range is at least not where they were.
-        if len(sighting.cells):
+        # Who is out of range or on another storey is at least not where they were.
+        if _within_reach(sighting, robot, parameters):
             new[label] = _followed(old.get(label), sighting, floor_height)
     return tuple(new[label] for label in sorted(new))
 
@@ -178,12 +187,22 @@ def _sightings(look: Look, own: MappingParameters, floor_height: float) -> list[
     found = []
     for label in np.unique(whose).tolist():
         mine = whose == label
+        pixels = int(mine.sum()) * step**2
+        if pixels < LEAST_PIXELS:
+            continue
         cut = [bool((look.labels[:, column] == label).any()) for column in (0, -1)]
+        above = float(np.median(height[mine]))
         x, y = (view.X_WC[:2, 3] + _middle(offset[:2, mine], cut[0], cut[1])).tolist()
         p_W = offset[:2, mine & inside].T + view.X_WC[:2, 3]
         cells = np.unique(np.floor(p_W[:, ::-1] / own.resolution).astype(np.int64), axis=0)
-        found.append(_Sighting(label, int(mine.sum()), (x, y), cells, look.time))
+        found.append(_Sighting(label, pixels, (x, y), above, cells, look.time))
     return found
+
+
+def _within_reach(sighting: _Sighting, robot: Point, own: MappingParameters) -> bool:
+    """Whether who is seen, maybe by the head alone, is in range on the storey of the robot."""
+    here = -SAME_STOREY <= sighting.height <= TALLEST + SAME_STOREY
+    return here and math.dist(sighting.position, robot) <= own.max_range
 
 
 def _middle(points: NDArray[np.float64], cut_left: bool, cut_right: bool) -> NDArray[np.float64]:
@@ -207,7 +226,7 @@ def _middle(points: NDArray[np.float64], cut_left: bool, cut_right: bool) -> NDA
 def _followed(old: MovingThing | None, sighting: _Sighting, floor_height: float) -> MovingThing:
     position, time = sighting.position, sighting.time
     if old is None or time - old.time > LONGEST_GAP:
-        anchor, since, walks = position, time, False
+        anchor, since, walks = position, time, True
     else:
         strayed = math.dist(position, old.anchor) > STRAY
         anchor, since = (position, time) if strayed else (old.anchor, old.since)

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I
 
+from unilavira_drake.mapping.moving_things import LEAST_PIXELS
 from unilavira_drake.messages import Intrinsics
 from unilavira_drake.messages.people import PeopleTracks, PersonTrack
 from unilavira_drake.ports import Level, image_input, pixels, pose_input, pose_matrix
 
-LEAST_PIXELS = 60
-"""Who shows fewer is not seen."""
 DEPTH = 0.10
 """A body's middle lies so far behind what is seen of it, metres."""
 STRIDE = 2

@@ -27,9 +27,11 @@ TURNING, TURNING_SOON = 0.10, 4
 ELBOW, SOON = 0.15, 4
 """Who would have the robot nearer than this, metres, within so many steps gives way to it."""
 SIDESTEP = 0.5
-"""Share of their speed at which they do so, whichever way they face."""
+"""Share of their speed at which they do so sideways and backwards; ahead they do at all of it."""
 STANDING = 0.05
 """A slower robot stands, metres a second."""
+BACK = math.radians(120.0)
+"""Who is to go on at more than this angle to how they move comes to a stand first."""
 REACHED = 0.10
 """A point of the walk is reached within this distance, metres."""
 SLOWEST = 0.25
@@ -55,7 +57,9 @@ class Walker(Message):
     held: float = -1.0
     """Since when it does not go on; -1 while it does, seconds."""
     speed: float = 0.0
-    """Wished just now, metres a second."""
+    """Wished just now, metres a second, ..."""
+    course: float = 0.0
+    """... and in which direction, radians in the world."""
     phase: float = 0.0
     """Of the gait, radians; pi is a step."""
 
@@ -138,7 +142,7 @@ def next_step(
     """
     x, y, yaw = pose
     walker = _arrived(person, walker, time, x, y)
-    target = _way_out(person, walker, robot, x, y) if manners.polite and robot else None
+    target = _way_out(person, walker, robot, pose) if manners.polite and robot else None
     if target is not None and target != walker.target:
         walker = dataclasses.replace(walker, target=target, way=-walker.way)
     goal_x, goal_y = person.walk[walker.target]
@@ -152,8 +156,11 @@ def next_step(
         and _must_wait(robot, x, y, bearing, person.speed, manners)
     )
     error = math.remainder(bearing - yaw, 2.0 * math.pi)
+    turns_back = _turns_back(walker, bearing)
     least = 0.0 if target is None else SIDESTEP
-    wish = 0.0 if resting or waits else person.speed * max(math.cos(error), least)
+    wish = person.speed * max(math.cos(error), least)
+    if resting or waits or turns_back:
+        wish = 0.0
     step = ACCELERATION * period
     speed = min(max(wish, walker.speed - 2.0 * step), walker.speed + step)
     walker = _patient(
@@ -166,6 +173,7 @@ def next_step(
     walker = dataclasses.replace(
         walker,
         speed=speed,
+        course=walker.course if turns_back else bearing,
         phase=math.remainder(walker.phase + math.pi * speed * period / STEP, 2.0 * math.pi),
     )
     turn = (
@@ -173,7 +181,8 @@ def next_step(
         if target is not None or (resting and walker.speed < 0.05)
         else min(max(TURN_GAIN * error, -TURN_RATE), TURN_RATE)
     )
-    return walker, Wish(speed * math.cos(bearing), speed * math.sin(bearing), turn)
+    course = walker.course
+    return walker, Wish(speed * math.cos(course), speed * math.sin(course), turn)
 
 
 def swing(walker: Walker) -> float:
@@ -208,7 +217,32 @@ def _patient(
     return dataclasses.replace(walker, target=target, way=-walker.way, held=-1.0)
 
 
-def _way_out(person: Person, walker: Walker, robot: RobotSeen, x: float, y: float) -> int | None:
+def _turns_back(walker: Walker, bearing: float) -> bool:
+    """Whether the person must come to a stand before it can go in this direction."""
+    turn = abs(math.remainder(bearing - walker.course, 2.0 * math.pi))
+    return walker.speed > 0.0 and turn > BACK
+
+
+def _covered(speed: float, pace: float, after: float) -> float:
+    """Returns how far towards a point somebody gets in so many seconds, metres.
+
+    Args:
+        speed: towards it now, metres a second; below 0 away from it.
+        pace: at which they will go there, metres a second.
+        after: seconds.
+    """
+    if speed < 0.0:
+        braking = min(after, -speed / (2.0 * ACCELERATION))
+        back = (speed + ACCELERATION * braking) * braking
+        return back + _covered(0.0, pace, after - braking)
+    rate = ACCELERATION if speed < pace else -2.0 * ACCELERATION
+    changing = min(after, (pace - speed) / rate)
+    return (speed + rate * changing / 2.0) * changing + pace * (after - changing)
+
+
+def _way_out(
+    person: Person, walker: Walker, robot: RobotSeen, pose: tuple[float, float, float]
+) -> int | None:
     """Returns the point of the walk to which the person gives way; None if there is no need to.
 
     They leave their walk for nobody: they go on or back, whatever takes them farther from where
@@ -216,6 +250,7 @@ def _way_out(person: Person, walker: Walker, robot: RobotSeen, x: float, y: floa
     """
     if not robot.within_reach or math.hypot(robot.vx, robot.vy) < STANDING:
         return None
+    x, y, yaw = pose
     steps = [k * FORESIGHT for k in range(1, SOON + 1)]
     near = math.hypot(*robot.nearest(x, y))
     staying = min(math.hypot(*robot.nearest(x, y, after)) for after in steps)
@@ -229,9 +264,10 @@ def _way_out(person: Person, walker: Walker, robot: RobotSeen, x: float, y: floa
         left = math.hypot(dx, dy)
         if left <= REACHED:
             continue
-        # It takes them half a step to get going.
-        pace = SIDESTEP * person.speed
-        moved = [min(pace * (after - FORESIGHT / 2.0), left) / left for after in steps]
+        bearing = math.atan2(dy, dx)
+        pace = person.speed * max(math.cos(bearing - yaw), SIDESTEP)
+        speed = -walker.speed if _turns_back(walker, bearing) else walker.speed
+        moved = [min(_covered(speed, pace, after), left) / left for after in steps]
         going = min(
             math.hypot(*robot.nearest(x + dx * part, y + dy * part, after))
             for part, after in zip(moved, steps, strict=True)
