@@ -138,8 +138,8 @@ class EpisodeMonitor(Level):
         new = self._follow_models(context, self._follow_contacts(context, new), time)
         new = self._follow_people(context, new)
         cause = _cause(new, action, self._budgets, time, spent=state.spent)
-        if new is state and not cause:
-            return state
+        if not cause and (new is state or new.metrics.time == time):
+            return new
         return dataclasses.replace(
             new, metrics=dataclasses.replace(new.metrics, time=time, cause=cause)
         )
@@ -155,7 +155,7 @@ class EpisodeMonitor(Level):
         if state.started and step < SHORTEST_STEP:
             if not turned:
                 return state
-            metrics = dataclasses.replace(metrics, progress_time=time)
+            metrics = dataclasses.replace(metrics, time=time, progress_time=time)
             return dataclasses.replace(state, metrics=metrics, yaw=yaw)
         distance = nearest = None
         if self._goal_distance is not None:
@@ -170,6 +170,7 @@ class EpisodeMonitor(Level):
         counts = not (self._flies and state.started) or step >= SHORTEST_FLIGHT
         metrics = dataclasses.replace(
             metrics,
+            time=time,
             x=x,
             y=y,
             z=z,
