@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import (
     AddMultibodyPlantSceneGraph,
     CoulombFriction,
@@ -28,11 +27,11 @@ from unilavira_drake.messages import Goal, OccupancyMap, Panorama, Sweep
 from unilavira_drake.navigation import make_navigation
 from unilavira_drake.planning.config import PlanningConfig
 from unilavira_drake.ports import Level, image_input, message_input, pose_input
-from unilavira_drake.resources import package_xml
 from unilavira_drake.robots.actuation import add_actuation, set_start
 from unilavira_drake.robots.flight_config import FlightConfig
 from unilavira_drake.robots.ground_tracking import project
 from unilavira_drake.robots.robot import Robot
+from unilavira_drake.robots.robot_model import add_robot_model
 from unilavira_drake.sensors.rig import front_intrinsics
 
 RESOLUTION = 0.05
@@ -163,10 +162,7 @@ def _station(robot: Robot, walls: list[Rectangle], start: tuple[float, float, fl
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, TIME_STEP)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
-    parser = Parser(plant)
-    parser.package_map().AddPackageXml(package_xml())
-    url = robot.model or f"package://unilavira_drake/robots/{robot.name}.sdf"
-    (instance,) = parser.AddModelsFromUrl(url)
+    instance = add_robot_model(plant, robot)
     for index, (x0, y0, x1, y1) in enumerate(walls):
         plant.RegisterCollisionGeometry(
             plant.world_body(),

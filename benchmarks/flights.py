@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -22,10 +21,10 @@ from pydrake.systems.sensors import ImageDepth32F
 
 from unilavira_drake.flight_navigation import MOVING_VIEWS, make_flight_navigation
 from unilavira_drake.messages import Goal, Panorama, Sweep
-from unilavira_drake.resources import package_xml
 from unilavira_drake.robots.actuation import add_actuation, set_start
 from unilavira_drake.robots.flight_config import FlightConfig
 from unilavira_drake.robots.quadrotor import Quadrotor
+from unilavira_drake.robots.robot_model import add_robot_model
 from unilavira_drake.robots.wind import WindModel
 from unilavira_drake.sensors.rig import front_intrinsics
 
@@ -130,10 +129,7 @@ def _station(
         time_step=robot.max_time_step, discrete_contact_approximation="lagged"
     )
     plant, _ = AddMultibodyPlant(plant_config, builder)
-    parser = Parser(plant)
-    parser.package_map().AddPackageXml(package_xml())
-    url = robot.model or f"package://unilavira_drake/robots/{robot.name}.sdf"
-    (instance,) = parser.AddModelsFromUrl(url)
+    instance = add_robot_model(plant, robot)
     for index, block in enumerate(blocks):
         low, high = np.array(block[:3]), np.array(block[3:])
         plant.RegisterCollisionGeometry(

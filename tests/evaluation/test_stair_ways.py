@@ -21,7 +21,7 @@ def way_over(stairs) -> float:
 
 def test_the_length_of_the_stairs() -> None:
     assert climb_length(STAIRS, 0.0, STAIRS.length) == pytest.approx(way_over(STAIRS))
-    assert climb_length(STAIRS, STAIRS.length, 0.0) == pytest.approx(STAIRS.way_length)
+    assert climb_length(STAIRS, STAIRS.length, 0.0) == pytest.approx(way_over(STAIRS))
     assert climb_length(STAIRS, -1.0, STAIRS.length + 0.5) == pytest.approx(way_over(STAIRS) + 1.5)
 
 

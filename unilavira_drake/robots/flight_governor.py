@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from unilavira_drake.kernels import frozen_view
-from unilavira_drake.messages import Awaited, VoxelMap
+from unilavira_drake.messages import VoxelMap
 from unilavira_drake.messages.voxels import TILE, tiles_between
 from unilavira_drake.ports import message_input, pose_input, vector_input
+from unilavira_drake.robots.awaited_replies import AwaitedReplies
 from unilavira_drake.robots.flight_limits import FlightLimits
 from unilavira_drake.robots.flight_stopping import (
     braked,
@@ -100,15 +101,12 @@ class FlightGovernor(LeafSystem):
         self._standoff = standoff
         self._command_timeout = command_timeout
         self._map_timeout = map_timeout
-        self._reply_timeout = reply_timeout
         self._pose_timeout = max(pose_timeout, 1.5 * limits.period)
         self._desired = vector_input(self, "desired_command", 8)
         self._map = message_input(self, "map", VoxelMap())
         self._pose = pose_input(self, "pose_estimate")
         self._twist = vector_input(self, "twist", 6)
-        self._awaited = tuple(
-            message_input(self, f"{role}_awaited", Awaited()) for role in ("language", "vision")
-        )
+        self._replies = AwaitedReplies(self, reply_timeout)
         unknown: Any = np.full(7, np.nan)
         index = self.DeclareDiscreteState(unknown)
         self._setpoint_index = int(index)
@@ -151,16 +149,8 @@ class FlightGovernor(LeafSystem):
 
     def _obeyed(self, context: Context, desired: list[float]) -> bool:
         """Whether a command is finite and fresh, and no reply is overdue."""
-        time = context.get_time()
-        fresh = abs(time - desired[7]) <= self._command_timeout
-        if not (fresh and all(map(math.isfinite, desired))):
-            return False
-        for reader in self._awaited:
-            awaited = reader.optional(context)
-            since = None if awaited is None else awaited.since
-            if since is not None and time - since > self._reply_timeout:
-                return False
-        return True
+        fresh = abs(context.get_time() - desired[7]) <= self._command_timeout
+        return fresh and all(map(math.isfinite, desired)) and not self._replies.overdue(context)
 
     def _lost(self, context: Context, discrete_state: DiscreteValues, pose: list[float]) -> bool:
         """Whether nobody knows how the aircraft moves."""

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from unilavira_drake.messages import Awaited, OccupancyMap, read_only
+from unilavira_drake.messages import OccupancyMap, read_only
 from unilavira_drake.ports import message_input, pose_input, vector_input
+from unilavira_drake.robots.awaited_replies import AwaitedReplies
 from unilavira_drake.robots.drive_limits import DriveLimits, approach
 from unilavira_drake.robots.stopping import (
     Footprint,
@@ -104,7 +105,6 @@ class Governor(LeafSystem):
         self._shy = footprint._replace(
             standoff=courtesy[0], half_width=footprint.half_width + courtesy[1]
         )
-        self._reply_timeout = reply_timeout
         self._pose_timeout = max(pose_timeout, 1.5 * limits.period)
         self._max_lateral_speed = max_lateral_speed
         self._ramps = ramps
@@ -112,9 +112,7 @@ class Governor(LeafSystem):
         self._map = message_input(self, "map", OccupancyMap())
         self._pose = pose_input(self, "pose_estimate")
         self._twist = vector_input(self, "twist", 6)
-        self._awaited = tuple(
-            message_input(self, f"{role}_awaited", Awaited()) for role in ("language", "vision")
-        )
+        self._replies = AwaitedReplies(self, reply_timeout)
         index = self.DeclareDiscreteState(3)
         self._command_index = int(index)
         # x, y, yaw that were seen last, and the time at which they were new.
@@ -157,17 +155,12 @@ class Governor(LeafSystem):
     def _fresh_desire(self, context: Context) -> tuple[float, float, float]:
         """The desired vx, vy and wz, or zero where that is late or makes no sense."""
         speed, lateral, rate, t_issued = self._desired(context).tolist()
-        time = context.get_time()
         # Not a number is not less, either.
-        fresh = abs(time - t_issued) <= self._command_timeout
+        fresh = abs(context.get_time() - t_issued) <= self._command_timeout
         if not (fresh and math.isfinite(speed + lateral + rate)):
             return 0.0, 0.0, 0.0
-        if speed or lateral or rate:
-            for reader in self._awaited:
-                awaited = reader.optional(context)
-                since = None if awaited is None else awaited.since
-                if since is not None and time - since > self._reply_timeout:
-                    return 0.0, 0.0, 0.0
+        if (speed or lateral or rate) and self._replies.overdue(context):
+            return 0.0, 0.0, 0.0
         return speed, lateral, rate
 
     def _sweeps(self, context: Context) -> bool:

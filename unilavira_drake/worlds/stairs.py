@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -86,12 +85,6 @@ class Stairs(Message):
             (middle * self.tread + self.landing, halfway),
             last,
         )
-
-    @property
-    def way_length(self) -> float:
-        """Length of the way from foot to head, metres."""
-        corners = (*self.profile, (self.length, self.top))
-        return sum(math.dist(a, b) for a, b in itertools.pairwise(corners))
 
     def point(self, s: float, across: float = 0.0) -> tuple[float, float]:
         """Returns (x, y) at a distance along the way up and to the left of its middle, metres."""
