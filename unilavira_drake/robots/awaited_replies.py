@@ -1,4 +1,4 @@
-"""How long the models' replies have been awaited, for those who stop a robot that waits too long."""
+"""How long the models' replies are awaited, for those who stop a robot that waits too long."""
 
 from __future__ import annotations
 
