@@ -161,7 +161,7 @@ def drive(
 def _station(robot: Robot, walls: list[Rectangle], start: tuple[float, float, float]) -> Any:
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, TIME_STEP)
-    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
     instance = add_robot_model(plant, robot)
     for index, (x0, y0, x1, y1) in enumerate(walls):
         plant.RegisterCollisionGeometry(

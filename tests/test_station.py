@@ -222,6 +222,21 @@ def test_at_a_wall_the_base_stalls_and_never_passes(start, limit):
     assert 100.0 < total < 1000.0
 
 
+@pytest.mark.parametrize("angle", [-1.2, -0.8, 0.0, 0.8, 1.0])
+def test_a_base_that_goes_on_pushing_does_not_creep_into_the_wall(angle):
+    rig = Rig(start=(7.5, 2.2, math.pi / 2 + angle))
+    deepest = 0.0
+    for _ in range(24):
+        rig.drive(0.25, 0.8, 0.0, 0.0)
+        results = rig.read("contact_results")
+        depths = [
+            results.point_pair_contact_info(i).point_pair().depth
+            for i in range(results.num_point_pair_contacts())
+        ]
+        deepest = max([deepest, *depths])
+    assert 0.0 < deepest < 0.02
+
+
 def test_images_are_rendered_only_when_pulled(monkeypatch):
     drawn = []
     render = SceneCamera._render

@@ -19,6 +19,7 @@ from pydrake.systems.framework import (
     BasicVector,
     Context,
     EventStatus,
+    InputPortIndex,
     LeafSystem,
     State,
 )
@@ -35,12 +36,12 @@ class InputReader(Generic[T]):
         self._system = system
         self._type = type_
         self._name = name
-        self._port = system.DeclareAbstractInputPort(name, model)
+        self._index = int(system.DeclareAbstractInputPort(name, model).get_index())
 
     @property
     def ticket(self) -> Any:
         """Dependency ticket of the port."""
-        return self._system.input_port_ticket(self._port.get_index())
+        return self._system.input_port_ticket(InputPortIndex(self._index))
 
     def __call__(self, context: Context) -> T:
         """Returns the value on the port.
@@ -48,27 +49,31 @@ class InputReader(Generic[T]):
         Raises:
             PortTypeError: if nothing is connected, or the value has another type.
         """
-        try:
-            value = self._port.Eval(context)
-        except (RuntimeError, ValueError):
-            # Asked only now: HasValue costs as much as Eval, a thousand times a second.
-            if self._port.HasValue(context):
-                raise
+        value = self.optional(context)
+        if value is None:
             raise PortTypeError(
                 f"{self._system.GetSystemPathname()}: input port {self._name!r} is not connected; "
                 f"connect an output that carries {self._type.__name__}."
-            ) from None
+            )
+        return value
+
+    def optional(self, context: Context) -> T | None:
+        """Returns the value on the port, or None when nothing is connected.
+
+        Raises:
+            PortTypeError: if the value has another type.
+        """
+        # Half as dear as to ask the port itself whether there is a value, and then for it.
+        held: Any = self._system.EvalAbstractInput(context, self._index)
+        if held is None:
+            return None
+        value = held.get_value()
         if not isinstance(value, self._type):
             raise PortTypeError(
                 f"{self._system.GetSystemPathname()}: input port {self._name!r} expects "
                 f"{self._type.__name__} and got {type(value).__name__}."
             )
         return value
-
-    def optional(self, context: Context) -> T | None:
-        """Returns the value on the port, or None when nothing is connected."""
-        # Asked first: an exception on a port that is left free costs a hundred times as much.
-        return self(context) if self._port.HasValue(context) else None
 
 
 def message_input(system: LeafSystem, name: str, default: T) -> InputReader[T]:

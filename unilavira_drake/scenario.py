@@ -170,7 +170,7 @@ class Scenario:
     # A robot may need shorter steps.
     plant: MultibodyPlantConfig = dc.field(
         default_factory=lambda: MultibodyPlantConfig(
-            time_step=0.025, discrete_contact_approximation="lagged"
+            time_step=0.025, discrete_contact_approximation="sap"
         )
     )
 

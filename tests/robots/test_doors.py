@@ -52,7 +52,7 @@ def test_a_stuck_robot_backs_off_and_gets_through(
     # So near to the frame its corner meets it in the turn.
     near = Footprint(standoff=0.05)
     monkeypatch.setattr("unilavira_drake.navigation._footprint", lambda robot: near)
-    drive = drives.seeded_drive(robot_kinds()["cobot_magic"](), 9)
+    drive = drives.seeded_drive(robot_kinds()["cobot_magic"](), 11)
     assert (drive.state, drive.backed_off) == ("arrived", True)
     assert drive.contact > 1.0
 

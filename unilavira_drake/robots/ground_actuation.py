@@ -1,4 +1,4 @@
-"""Actuation on the ground: a twist in the plane, carried out by the servos of the joints."""
+"""Actuation on the ground: a twist in the plane, carried out by servos of the joints."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort, System
 
 from unilavira_drake.robots.planar_base import BASE_JOINTS, HEIGHT_JOINT, PlanarBase
 from unilavira_drake.robots.planar_pose import PlanarPose
 from unilavira_drake.robots.robot import GroundRobot
 from unilavira_drake.robots.terrain import GroundHeight, TerrainFollower, set_start_height
+from unilavira_drake.robots.velocity_servo import VelocityServo, take_servos
 from unilavira_drake.robots.walking_base import WalkingBase
 
 
@@ -42,7 +43,7 @@ def add_ground_actuation(
         )
     builder.AddNamedSystem("locomotion", locomotion)
     state = plant.get_state_output_port(model_instance)
-    desired = plant.get_desired_state_input_port(model_instance)
+    desired = _servo_input(builder, plant, model_instance)
     if HEIGHT_JOINT in joints and ground_height is not None:
         terrain = builder.AddSystem(
             TerrainFollower(joints=joints, actuated=actuated, ground_height=ground_height)
@@ -63,6 +64,22 @@ def add_ground_actuation(
     pose = builder.AddSystem(PlanarPose(joints=joints))
     builder.Connect(state, pose.GetInputPort("joint_state"))
     return pose.GetOutputPort("X_WB"), pose.GetOutputPort("twist")
+
+
+def _servo_input(
+    builder: DiagramBuilder, plant: MultibodyPlant, model_instance: ModelInstanceIndex
+) -> InputPort:
+    """The port that takes the desired state of the actuated joints, of whichever servos."""
+    gains = take_servos(plant, model_instance)
+    if gains is None:
+        return plant.get_desired_state_input_port(model_instance)
+    servo = builder.AddSystem(VelocityServo(gains))
+    state = plant.get_state_output_port(model_instance)
+    builder.Connect(state, servo.GetInputPort("joint_state"))
+    builder.Connect(
+        servo.GetOutputPort("actuation"), plant.get_actuation_input_port(model_instance)
+    )
+    return servo.GetInputPort("desired_joint_state")
 
 
 def set_ground_start(
