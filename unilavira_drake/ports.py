@@ -150,6 +150,10 @@ of 0.1 s is no multiple of any usual plant step (5, 10 or 25 ms).
 """
 
 
+DID_NOTHING = EventStatus.DidNothing()
+SUCCEEDED = EventStatus.Succeeded()
+
+
 class Level(LeafSystem):
     """A System with one frozen abstract state, polled at a fixed period.
 
@@ -167,8 +171,9 @@ class Level(LeafSystem):
         super().__init__()
         if offset is None:
             offset = OFFSET * period
-        self._state_index = self.DeclareAbstractState(AbstractValue.Make(initial_state))
-        self._state_tickets = {self.abstract_state_ticket(self._state_index)}
+        index = self.DeclareAbstractState(AbstractValue.Make(initial_state))
+        self._state_index = int(index)
+        self._state_tickets = {self.abstract_state_ticket(index)}
         self._mirror: tuple[int, Callable[[Any], NDArray[np.float64]]] | None = None
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._tick)
 
@@ -199,7 +204,7 @@ class Level(LeafSystem):
 
     def state(self, context: Context) -> Any:
         """Returns the frozen state."""
-        return context.get_abstract_state(int(self._state_index)).get_value()
+        return context.get_abstract_state(self._state_index).get_value()
 
     def step(self, context: Context, state: Any) -> Any:
         """Returns the next state; the same object when there is nothing to do.
@@ -215,10 +220,10 @@ class Level(LeafSystem):
         if isinstance(new, EventStatus):
             return new
         if new is old:
-            return EventStatus.DidNothing()
-        state.get_mutable_abstract_state(int(self._state_index)).set_value(new)
+            return DID_NOTHING
+        state.get_mutable_abstract_state(self._state_index).set_value(new)
         if self._mirror is not None:
             index, view = self._mirror
             vector: Any = state.get_mutable_discrete_state(index)
             vector.SetFromVector(view(new))
-        return EventStatus.Succeeded()
+        return SUCCEEDED
