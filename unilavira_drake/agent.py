@@ -59,6 +59,7 @@ def make_agent(
     prompt_preset: str = "compact",
     grounder: str = "none",
     people: bool = False,
+    stairs_barred: bool = False,
     replace: MutableMapping[str, System] | None = None,
 ) -> Diagram:
     """Returns the agent; it is the same for every robot.
@@ -70,6 +71,7 @@ def make_agent(
     ``prompt_preset`` is a key of ``PROMPT_PRESETS``.
     ``grounder`` is ``none``, ``color`` or ``label`` (which reads the detector); a ``grounder`` in
     ``replace`` is wired in any case. ``people``: its prompts say who is where and moves how.
+    ``stairs_barred``: they say that there are stairs here and this robot takes none.
     """
     wiring = Wiring(replace)
     preset = PROMPT_PRESETS[prompt_preset]
@@ -87,6 +89,7 @@ def make_agent(
             detector=evidence(language_model),
             view_detail=preset.view_detail,
             history_detail=preset.history_detail,
+            stairs_barred=stairs_barred,
         ),
     )
     wiring.add(

@@ -125,6 +125,7 @@ def make_navigation_diagram(
             prompt_preset=scenario.prompt_preset,
             grounder=scenario.grounder,
             people=tells_of_people(scenario.people),
+            stairs_barred=_stairs_barred(scenario, world),
             replace=own,
         ),
     )
@@ -190,6 +191,14 @@ def _free_distance(scenario: Scenario) -> Callable[[Frame], float]:
         max_height=scenario.mapping.max_height,
         max_range=max_range,
     )
+
+
+def _stairs_barred(scenario: Scenario, world: World) -> bool:
+    """Whether there are other floors and the robot reaches none: it neither climbs nor flies up."""
+    if scenario.robot.can_climb or not world.stairs:
+        return False
+    lowest = min(stairs.top for stairs in world.stairs)
+    return not scenario.robot.flies or scenario.flight.max_altitude < lowest
 
 
 _OPTIONAL_LEVELS = ("people_tracker", "recalibration", "locomotion")

@@ -109,3 +109,40 @@ def test_the_vision_prompt_asks_for_the_steps_and_rules_mark_them() -> None:
     reply = json.loads(MODEL.complete(dataclasses.replace(vision, variables=elsewhere)).text)
     assert reply["box"] is reply["point"] is None
     assert reply["reason"]
+
+
+def places(*rooms):
+    return tuple(
+        WaypointNote(id=i, distance=9.0, bearing=40.0 * i, scene=f"In the {room}; sees red chair")
+        for i, room in enumerate(rooms, start=1)
+    )
+
+
+NOTHING_NEW = ("kitchen", "corridor", "study", *["corridor", "study"] * 5)
+STILL_NEW = ("kitchen", "corridor", *["corridor"] * 5, "study", "corridor", "study", "bathroom")
+
+
+@pytest.mark.parametrize(
+    ("text", "rooms", "why"),
+    [
+        ("Go upstairs and enter the bedroom.", (), "The next step is to go upstairs, and"),
+        ("Find the bed.", NOTHING_NEW, "No bed is in the rooms of this floor, and"),
+        ("Enter the bedroom.", NOTHING_NEW, "No bedroom is in the rooms of this floor, and"),
+        ("Find the bed.", STILL_NEW, ""),
+        ("Find the bed.", NOTHING_NEW[:8], ""),
+        ("Find the red sofa.", NOTHING_NEW, ""),
+    ],
+)
+def test_a_robot_told_that_it_takes_no_stairs_stops_with_a_reason(text, rooms, why) -> None:
+    changes = {"waypoints": places(*rooms), "current_waypoint": len(rooms)}
+    asked = seeing_stairs(text, can_climb=False, stairs_barred=True, **changes)
+    reply = json.loads(MODEL.complete(asked).text)
+    check = json.loads(MODEL.complete(dataclasses.replace(asked, call="double_check")).text)
+    assert reply["reasoning_action"].startswith(why)
+    assert (reply["action"]["tool"] == "double_check") == bool(why)
+    assert check["confirmed"] == bool(why)
+    if why:
+        assert check["reason"].startswith(why)
+        assert check["reason"].endswith("this robot cannot take stairs.")
+    untold = seeing_stairs(text, can_climb=False, **changes)
+    assert decision(untold)["tool"] != "double_check"

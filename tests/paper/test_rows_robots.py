@@ -59,7 +59,8 @@ robot:
   control_period: 0.025
 """
 BODY = {"can_climb", "view_degrees"}
-"""All that a prompt knows of the robot: whether it climbs, and how wide its camera sees."""
+"""All that a prompt knows of the robot: whether it climbs (in a house with stairs it is told, too,
+that it does not: ``stairs_barred``), and how wide its camera sees."""
 
 
 def ports(system: System, names: tuple[str, ...]) -> dict[str, str]:

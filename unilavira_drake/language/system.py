@@ -71,6 +71,7 @@ class Language(Level):
         detector: evidence for a model declared ``ground_truth``; None for all others.
         view_detail: how finely the model looks at the four views, see ``ImagePart``.
         history_detail: how finely it looks at pictures of the past.
+        stairs_barred: whether the prompt says that there are stairs and this robot takes none.
     """
 
     def __init__(
@@ -83,10 +84,12 @@ class Language(Level):
         detector: Callable[[Frame], ViewEvidence] | None = None,
         view_detail: str = "medium",
         history_detail: str = "low",
+        stairs_barred: bool = False,
     ) -> None:
         super().__init__(LanguageState(), period=period)
         self._seed = seed
         self._can_climb = can_climb
+        self._stairs_barred = stairs_barred
         self._free_distance = free_distance
         self._detector = detector
         self._view_detail = view_detail
@@ -147,6 +150,7 @@ class Language(Level):
             history_detail=self._history_detail,
             people=self._people.optional(context),
             time=context.get_time(),
+            stairs_barred=self._stairs_barred,
         )
         return dataclasses.replace(state, request=request)
 

@@ -58,6 +58,7 @@ def language_request(
     history_detail: str = "low",
     people: PeopleTracks | None = None,
     time: float = 0.0,
+    stairs_barred: bool = False,
 ) -> MllmRequest:
     """Returns the first attempt of call ``panorama.n``.
 
@@ -96,6 +97,7 @@ def language_request(
         failed_direction="" if second_chance is None else second_chance.failed_direction,
         failed_pictures=tuple(picture.name for picture in failed_frames),
         can_climb=can_climb,
+        stairs_barred=stairs_barred,
         view_degrees=round(math.degrees(panorama.frame("front").intrinsics.horizontal_fov)),
         choices=task.choices,
         forgotten=_forgotten(history),

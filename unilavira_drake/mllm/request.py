@@ -113,6 +113,8 @@ class LanguageVariables(Message):
     failed_pictures: tuple[str, ...] = ()
     """On ``recover``: names of the pictures of the way that failed, e.g. ``H5``."""
     can_climb: bool = False
+    stairs_barred: bool = False
+    """Whether there are stairs that the robot cannot take: all it can do is on this floor."""
     view_degrees: int = 79
     """How wide a view is, degrees."""
     choices: tuple[str, ...] = ()

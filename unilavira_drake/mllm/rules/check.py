@@ -6,10 +6,12 @@ import re
 from typing import Any
 
 from unilavira_drake.answer_words import chosen
+from unilavira_drake.mllm.rules.aim import aim_of
 from unilavira_drake.mllm.rules.clauses import Clause, describe
 from unilavira_drake.mllm.rules.lexicon import tokenize
 from unilavira_drake.mllm.rules.progress import review
 from unilavira_drake.mllm.rules.situation import Situation
+from unilavira_drake.mllm.rules.stairs import out_of_reach
 
 UNKNOWN = "unknown"
 
@@ -19,6 +21,8 @@ def double_check(situation: Situation) -> dict[str, Any]:
     # Without a TODO list nothing tells which steps the last decision closed: look again.
     listed = situation.variables.todo is not None
     open_steps = situation.pending if listed else review(situation).pending
+    if why := out_of_reach(situation, aim_of(review(situation).steps, situation.scene.room).goal):
+        return {"reasoning": why, "confirmed": True, "reason": why}
     if open_steps:
         reason = f"not done: {describe(open_steps[0].clause)}"
         return {"reasoning": reason, "confirmed": False, "reason": reason}

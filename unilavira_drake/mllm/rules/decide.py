@@ -20,7 +20,7 @@ from unilavira_drake.mllm.rules.options import options
 from unilavira_drake.mllm.rules.plan import Step
 from unilavira_drake.mllm.rules.progress import Progress, review
 from unilavira_drake.mllm.rules.situation import Situation
-from unilavira_drake.mllm.rules.stairs import stairs_to_take
+from unilavira_drake.mllm.rules.stairs import out_of_reach, stairs_to_take
 
 _RETURN = 6.0
 """What a backtrack costs beside its length, in metres of detour."""
@@ -54,6 +54,9 @@ def decide(situation: Situation) -> dict[str, Any]:
         for s in reopened
     ]
     aim = aim_of(progress.steps, situation.scene.room)
+    if why := out_of_reach(situation, aim.goal):
+        reply["reasoning_action"] = f"{why} Nothing is left to do here: check and stop."
+        return _without_list(reply, situation)
     flight = stairs_to_take(situation, aim.goal)
     if flight is not None:
         reply["action"] = {"tool": "go_stair", "stair": flight.stair, "direction": flight.direction}

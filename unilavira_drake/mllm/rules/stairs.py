@@ -1,4 +1,4 @@
-"""When to take stairs, and which way."""
+"""When to take stairs, and which way; what is out of reach of a robot that takes none."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from unilavira_drake.mllm.rules.vocabulary import STAIRS
 
 _SEARCHED = 3
 """Rooms that are looked at on a floor before another floor is tried without being told."""
+_LULL = 8
+"""After this many places without a new kind of room a floor is given up, where no other is left."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,28 @@ def stairs_to_take(situation: Situation, goal: Clause | None) -> StairChoice | N
             why += f" The {largest.direction} view shows the stairs ({largest.id})."
             return StairChoice(stair, largest.direction, why)
     return None
+
+
+def out_of_reach(situation: Situation, goal: Clause | None) -> str:
+    """Returns why nothing is left to do for a robot that is told it takes no stairs, or nothing.
+
+    The next step takes stairs; or its goal is not in view and the search finds no new room.
+    """
+    if not situation.variables.stairs_barred or goal is None:
+        return ""
+    if goal.kind == "climb":
+        return f"The next step is to go {goal.side}stairs, and this robot cannot take stairs."
+    searches = bool(goal.category or goal.room) and goal.kind != "leave"
+    if not searches or situation.scene.matching(goal) or not _nothing_new(situation):
+        return ""
+    what = goal.thing or goal.room
+    return f"No {what} is in the rooms of this floor, and this robot cannot take stairs."
+
+
+def _nothing_new(situation: Situation) -> bool:
+    """Whether the latest places lie in rooms of kinds that were entered before."""
+    rooms = [place.room for place in situation.visited if place.room]
+    return len(rooms) > _LULL and set(rooms[-_LULL:]) <= set(rooms[:-_LULL])
 
 
 def _searched(situation: Situation, goal: Clause) -> bool:
