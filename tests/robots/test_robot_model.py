@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, System
 
+from unilavira_drake import load_scenario, make_navigation_diagram
 from unilavira_drake.errors import ScenarioError
+from unilavira_drake.resources import models_path
+from unilavira_drake.robots.actuation import add_actuation
 from unilavira_drake.robots.cobot_magic import CobotMagic
+from unilavira_drake.robots.gait_config import Gait
+from unilavira_drake.robots.planar_base import PlanarBase
+from unilavira_drake.robots.robot import GroundRobot
 from unilavira_drake.robots.robot_model import add_robot_model
+from unilavira_drake.robots.unitree_go1 import UnitreeGo1
 from unilavira_drake.scenario import robot_kinds
 
 CART = Path(__file__).resolve().parents[2] / "examples" / "add_a_robot" / "tracked_cart.sdf"
@@ -85,3 +93,73 @@ def test_a_file_of_two_models_is_refused(plant: MultibodyPlant, tmp_path: Path) 
 def test_a_file_that_is_not_there_is_told(plant: MultibodyPlant, model: str) -> None:
     with pytest.raises(ScenarioError, match=rf"^robot\.model: .*{re.escape(model)}"):
         add_robot_model(plant, CobotMagic(model=model))
+
+
+GO1 = models_path() / "robots" / "unitree_go1.sdf"
+STILL = Gait(heave=0.0, roll_degrees=0.0, pitch_degrees=0.0, swing_degrees=0.0)
+
+
+def actuate(robot: GroundRobot, locomotion: System | None = None) -> None:
+    """Gives a robot alone in the world its actuation."""
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, 0.025)
+    instance = add_robot_model(plant, robot)
+    plant.Finalize()
+    add_actuation(builder, plant, instance, robot, locomotion=locomotion)
+
+
+@pytest.mark.parametrize(
+    ("gait", "told"),
+    [
+        (Gait(), "heave 0.01, roll_degrees 2, pitch_degrees 1, swing_degrees 20: "),
+        (dataclasses.replace(STILL, heave=0.02), "heave 0.02: "),
+        (dataclasses.replace(STILL, swing_degrees=15.0), "swing_degrees 15: "),
+        (STILL, ""),
+        (None, ""),
+    ],
+)
+def test_a_gait_needs_the_joints_it_swings(gait: Gait | None, told: str) -> None:
+    robot = CobotMagic(model=str(CART), gait=gait)
+    if not told:
+        actuate(robot)
+        return
+    with pytest.raises(ScenarioError) as error:
+        actuate(robot)
+    words = str(error.value)
+    assert words.startswith(f"robot.gait: {told}")
+    assert repr(str(CART)) in words
+    for number, joint in (("heave", "trunk_z"), ("swing_degrees", "LEG_hip")):
+        assert (f"{joint!r}" in words) == (f"{number}: 0" in words) == (number in told)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "told"),
+    [
+        ('(?<=joint name=")trunk_roll', "roll_degrees 1.5"),
+        ('(?<=joint name=")[a-z]+_(left|right)_(?=hip)', "swing_degrees 22"),
+        ('(?<=joint name=")[a-z]+_(left|right)_(?=knee)', ""),
+        ('(?<=joint name=")front_left_', ""),
+    ],
+)
+def test_one_joint_is_enough_for_each_number(tmp_path: Path, pattern: str, told: str) -> None:
+    numbers = itertools.count()
+    text, count = re.subn(pattern, lambda found: f"own_{next(numbers)}_", GO1.read_text())
+    assert count
+    path = tmp_path / "own_go1.sdf"
+    path.write_text(text)
+    robot = UnitreeGo1(model=str(path))
+    if not told:
+        actuate(robot)
+        return
+    with pytest.raises(ScenarioError, match=f"^robot.gait: {told}: "):
+        actuate(robot)
+
+
+def test_a_locomotion_of_ones_own_swings_what_it_likes() -> None:
+    actuate(CobotMagic(model=str(CART), gait=Gait()), locomotion=PlanarBase(holonomic=False))
+
+
+def test_a_scenario_is_told_too() -> None:
+    scenario = load_scenario("flat", "robot: !CobotMagic {gait: {swing_degrees: 0}}")
+    with pytest.raises(ScenarioError, match=r"'cobot_magic' lacks .* or set \{heave: 0, roll_deg"):
+        make_navigation_diagram(scenario)

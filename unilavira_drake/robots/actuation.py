@@ -48,6 +48,7 @@ def add_actuation(
 
     Raises:
         TypeError: if nothing is known to move such a robot.
+        ScenarioError: if it is given a gait whose joints its model lacks.
     """
     if isinstance(robot, GroundRobot):
         X_WB, twist = add_ground_actuation(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from unilavira_drake.robots.gait_config import Gait
 
@@ -67,6 +67,26 @@ def swing(
         positions.append(amplitude * size * position)
         velocities.append(amplitude * size * velocity)
     return positions, velocities
+
+
+def joints_without(gait: Gait, joints: Collection[str]) -> dict[str, str]:
+    """Returns what of a gait nothing would show: of each such amplitude, the joint it swings.
+
+    Args:
+        gait: amplitudes; one of 0 needs no joint.
+        joints: names of the joints that are there to be swung.
+    """
+    needed = {
+        "heave": ("trunk_z",),
+        "roll_degrees": ("trunk_roll",),
+        "pitch_degrees": ("trunk_pitch",),
+        "swing_degrees": tuple(f"{leg}_hip" for leg in LEG_PHASES),
+    }
+    return {
+        name: names[0] if len(names) == 1 else "LEG_hip"
+        for name, names in needed.items()
+        if getattr(gait, name) and not any(joint in joints for joint in names)
+    }
 
 
 def _waves(gait: Gait) -> Mapping[str, tuple[float, float, float]]:

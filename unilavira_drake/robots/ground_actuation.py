@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort, System
 
+from unilavira_drake.errors import ScenarioError
+from unilavira_drake.robots.gait import joints_without
 from unilavira_drake.robots.planar_base import BASE_JOINTS, HEIGHT_JOINT, PlanarBase
 from unilavira_drake.robots.planar_pose import PlanarPose
 from unilavira_drake.robots.robot import GroundRobot
@@ -29,12 +32,16 @@ def add_ground_actuation(
 
     Returns:
         The ports of the true pose X_WB and of the twist.
+
+    Raises:
+        ScenarioError: if our locomotion shall swing a joint that the model lacks.
     """
     if robot.gait is None and locomotion is None:
         locomotion = PlanarBase(holonomic=robot.holonomic)
     joints = joint_names(plant, model_instance)
     actuated = actuator_names(plant, model_instance)
     if locomotion is None:
+        _check_gait(robot, actuated)
         locomotion = WalkingBase(
             robot=robot,
             joints=[name for name in joints if name != HEIGHT_JOINT],
@@ -80,6 +87,20 @@ def _servo_input(
         servo.GetOutputPort("actuation"), plant.get_actuation_input_port(model_instance)
     )
     return servo.GetInputPort("desired_joint_state")
+
+
+def _check_gait(robot: GroundRobot, actuated: Collection[str]) -> None:
+    """Refuses a gait of which the model would show nothing."""
+    lacking = joints_without(robot.gait, actuated) if robot.gait else {}
+    if not lacking:
+        return
+    numbers = ", ".join(f"{name} {getattr(robot.gait, name):g}" for name in lacking)
+    zeros = ", ".join(f"{name}: 0" for name in lacking)
+    raise ScenarioError(
+        f"robot.gait: {numbers}: the model {robot.model or robot.name!r} lacks the joints that "
+        f"would show it ({', '.join(map(repr, lacking.values()))}); add them, with "
+        f"drake:controller_gains (docs/add_a_robot.md), or set {{{zeros}}}."
+    )
 
 
 def set_ground_start(
