@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 from run_on_paper import Pen, pose
 
 from unilavira_drake.evaluation.air_goal import make_goal
-from unilavira_drake.messages import LanguageAction, Outcome, Panorama
+from unilavira_drake.messages import LanguageAction, NavigationStatus, Outcome, Panorama
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.recording.run_folder import RunFolder
 from unilavira_drake.report.model import read_run
@@ -89,6 +90,50 @@ def test_a_step_shows_the_way_before_it_on_its_own_floor_alone(folder: Path) -> 
     # The last place downstairs, two upstairs and where this step begins.
     assert len(way.split()) == 4
     assert f'<polyline class="way" points="{way}"/>' in render_report(folder)
+
+
+CLIMB = ((7.7, 1.0, 0.0), (7.7, 4.0, 0.7), (7.7, 6.5, 2.2), (7.7, 7.0, 2.6), (7.7, 8.5, 2.8))
+"""South to north over the stairs; the floor above begins a little below it."""
+
+
+def climb(path: Path, places: Iterable[tuple[float, float, float]]) -> Sheet:
+    """Returns the drawing of a run whose first action drives over places, the second nowhere."""
+    with RunFolder(path) as run:
+        run.write("scenario.yaml", dump_scenario(load_scenario("two_storey")))
+        pen = Pen(run)
+        driven = tuple(places)
+        for n, way in enumerate((driven, driven[-1:]), start=1):
+            X_WB = pose(*way[0][:2], 1.57)
+            X_WB[2, 3] = way[0][2]
+            pen.say("observer", "panorama", Panorama(n, n, 0.1, X_WB, (), Outcome()))
+            pen.say("language", "language_action", LanguageAction(n, "decide", "go_stair", "front"))
+            for x, y, z in way:
+                pen.say("episode_monitor", "metrics", EpisodeMetrics(x=x, y=y, z=z))
+            pen.say("planner", "navigation_status", NavigationStatus(n))
+    return Sheet(read_run(path), read_setting(path, None))
+
+
+def ordinates(points: str) -> list[float]:
+    """Returns how far down the page the points lie."""
+    return [float(point.partition(",")[2]) for point in points.split()]
+
+
+def test_a_climb_is_drawn_on_each_floor_as_far_as_it_led_there(tmp_path: Path) -> None:
+    for up in (True, False):
+        path = tmp_path / f"{up}"
+        sheet = climb(path, CLIMB if up else CLIMB[::-1])
+        first, second = (sheet.overlay(step, "") for step in read_run(path).steps)
+        assert (first.floor, second.floor) == (("", "2") if up else ("2", ""))
+        (leg,), (way,) = first.leg, second.way
+        ((_, left),), ((_, reached),) = first.stairs, second.stairs
+        # Each ends where the other floor begins, on the stairs, and that is marked.
+        assert ordinates(leg)[-1] == left
+        assert ordinates(way)[0] == reached
+        assert (min if up else max)(ordinates(leg)) == left
+        assert (max if up else min)(ordinates(way)) == reached
+        page = render_report(path)
+        assert page.count('<path class="stairs"') == 4
+        assert page.count("to or from another floor") == 2
 
 
 def test_an_end_on_another_floor_is_not_drawn(tmp_path: Path) -> None:

@@ -80,8 +80,8 @@ class Overlay:
     """Data URI, x, y, width and height."""
     way: tuple[str, ...] = ()
     """Before this step, on its floor; in pieces."""
-    leg: str = ""
-    """That this step's action drove."""
+    leg: tuple[str, ...] = ()
+    """That this step's action drove, on the floor on which the step begins; in pieces."""
     back: bool = False
     """Whether the leg is a backtrack."""
     cone: str = ""
@@ -93,6 +93,8 @@ class Overlay:
     sight: str = ""
     """From the robot to the aim."""
     waypoints: tuple[Mark, ...] = ()
+    stairs: tuple[tuple[float, float], ...] = ()
+    """Where way and leg lead to another floor or come from one."""
 
 
 class Sheet:
@@ -130,12 +132,13 @@ class Sheet:
         points = self._trace.points
         decided = math.inf if step.decided is None else step.decided
         ended = decided if step.ended is None and step.status is None else step.ended
-        leg = stretch(points, decided, math.inf if ended is None else ended)
+        until = math.inf if ended is None else ended
         back = step.action is not None and step.action.tool == "backtrack"
         pose = self._trace.poses.get(step.n)
         floor = self._name(self._trace.height(step.n))
         part = self._parts.get(floor, self._trace)
         before = without(stretch(points, -math.inf, decided), part.away)
+        leg = without(stretch(points, decided, until), part.away)
         p_WG = step.goal.p_WG if step.goal is not None else None
         aim = self._point(*p_WG[:2]) if p_WG is not None else None
         here = self._point(*pose[:2]) if pose is not None else None
@@ -143,13 +146,16 @@ class Sheet:
             floor=floor,
             occupancy=self._placed(step, occupancy),
             way=tuple(self._points(piece[:, 1:]) for piece in before),
-            leg=self._points((beside(leg, self._lane) if back else leg)[:, 1:]),
+            leg=tuple(
+                self._points((beside(piece, self._lane) if back else piece)[:, 1:]) for piece in leg
+            ),
             back=back,
             cone=self._cone(step, pose),
             pose="" if pose is None else self._arrow(*pose),
             aim=aim,
             sight="" if aim is None or here is None else f"{here[0]},{here[1]} {aim[0]},{aim[1]}",
             waypoints=self._waypoints(part, step.n),
+            stairs=self._stairs(part, until),
         )
 
     def timed_way(self) -> tuple[tuple[str, str, bool], ...]:
@@ -192,6 +198,13 @@ class Sheet:
             for waypoint, place in sorted(trace.waypoints.items())
             if n is None or self._first_seen.get(waypoint, 0) <= n
         )
+
+    def _stairs(self, part: EpisodeTrace, until: float) -> tuple[tuple[float, float], ...]:
+        """Returns where the way changes between the floor of a part and others."""
+        times = part.points[:, 0]
+        changes = (t for span in part.away for t in span if times[0] < t < min(until, times[-1]))
+        places = (stretch(part.points, t, t)[0, 1:] for t in changes)
+        return tuple(self._point(x, y) for x, y in places)
 
     def _part(self, name: str) -> EpisodeTrace:
         return self._trace.on(lambda z: self._name(z) == name)
