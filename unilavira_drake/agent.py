@@ -90,6 +90,7 @@ def make_agent(
             view_detail=preset.view_detail,
             history_detail=preset.history_detail,
             stairs_barred=stairs_barred,
+            reach=flight.horizon,
         ),
     )
     wiring.add(

@@ -14,7 +14,14 @@ from unilavira_drake.memory.waypoints import (
     remember,
     with_picture,
 )
-from unilavira_drake.messages import KeyPicture, LanguageAction, Outcome, Panorama, VisionAction
+from unilavira_drake.messages import (
+    ON_THE_WAY,
+    KeyPicture,
+    LanguageAction,
+    Outcome,
+    Panorama,
+    VisionAction,
+)
 
 NOTHING = LanguageAction()
 BOUNDS = MemoryBounds(waypoints=4, decisions=3, keyframes=8, merge_distance=0.5)
@@ -82,6 +89,38 @@ def test_edge_caption_and_offer_of_a_drive() -> None:
     assert edge.bearing == pytest.approx(1.0 + math.pi / 2)
     assert state.second_chance.offers == (1,)
     assert state.history.decisions[-1].target_desc == "white door"
+
+
+@pytest.mark.parametrize(
+    ("outcome", "edge", "told"),
+    [
+        (Outcome("arrived", "", 0.72), "arrived", "arrived, 0.7 m from it"),
+        (
+            Outcome("arrived", "", 7.7, -6.52),
+            "arrived",
+            "arrived, 7.7 m from it (it is 6.5 m lower)",
+        ),
+        (
+            Outcome("arrived", ON_THE_WAY, 31.0, 12.0),
+            ON_THE_WAY,
+            "on the way, 31.0 m from it (it is 12.0 m higher)",
+        ),
+        (Outcome("arrived", ON_THE_WAY), ON_THE_WAY, "on the way, too far to measure"),
+    ],
+)
+def test_it_is_told_how_far_the_mark_still_is(outcome: Outcome, edge: str, told: str) -> None:
+    state = step(WaypointState(), panorama(1, 0, 0))
+    state = step(state, panorama(2, 40, 0, outcome=outcome), turn(1, "front"), target="a boat")
+    assert [(e.outcome, e.to, e.arrived, e.failed) for e in state.history.edges] == [
+        (edge, 2, True, False)
+    ]
+    assert state.history.decisions[-1].outcome == told
+    # What was flown by numbers has no mark.
+    flown = LanguageAction(n=1, call="decide", tool="fly", distance=40.0)
+    state = step(
+        step(WaypointState(), panorama(1, 0, 0)), panorama(2, 40, 0, outcome=outcome), flown
+    )
+    assert state.history.decisions[-1].outcome == edge
 
 
 def test_near_place_is_the_same_waypoint() -> None:

@@ -20,6 +20,7 @@ FLIGHT = _with(
     task="The target is 120 m at 30 degrees from you. It is a red car.",
     in_flight=True,
     compass=112.0,
+    reach=40.0,
     views=(*VARIABLES.views, ViewNote(DOWN, 18.5)),
     waypoints=(
         WaypointNote(1, 31.2, 178.0, -90.0, "a street", (), True, "H1", height=-12.4),
@@ -53,6 +54,11 @@ def test_nothing_of_the_ground_is_left(name: str) -> None:
     for word in ("four views", "floor", "door frame, ", "ten metres in one turn"):
         assert word not in text.replace("door frame'", "")
     assert ("REASON ON DIRECTIONS" in text) is (name == "decide_not_grounded")
+
+
+def test_how_far_one_move_goes() -> None:
+    text = _text(_with(FLIGHT, reach=7.5))
+    assert "around obstacles, up to 7.5 metres in one turn;" in text
 
 
 @pytest.mark.parametrize(

@@ -212,10 +212,10 @@ class _Blind(RulesModel):
 @pytest.mark.parametrize(
     ("last", "height", "climb"),
     [
-        ("turn front to 'yellow boat': arrived: on the way", 30.0, -15.0),
+        ("turn front to 'yellow boat': on the way", 30.0, -15.0),
         ("turn front to 'yellow boat': arrived", 30.0, None),
-        ("turn front to 'red car': arrived: on the way", 30.0, None),
-        ("turn front to 'yellow boat': arrived: on the way", 15.0, 10.0),
+        ("turn front to 'red car': on the way", 30.0, None),
+        ("turn front to 'yellow boat': on the way", 15.0, 10.0),
     ],
 )
 def test_what_was_lost_on_the_way_is_looked_for_from_lower(town, last, height, climb):

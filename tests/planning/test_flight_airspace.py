@@ -1,12 +1,13 @@
 """What the flight planner adds around a path: the climb at the start, and where the air ends."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 from test_visibility_planner import Bench, go
 
-from unilavira_drake.messages import NavigationStatus
+from unilavira_drake.messages import ON_THE_WAY, NavigationStatus, Outcome
 from unilavira_drake.planning.visibility_system import AIRSPACE_ENDS
 
 STEEP = {"climb_angle": math.pi / 2, "descend_angle": math.pi / 2}
@@ -66,3 +67,16 @@ def test_a_goal_within_it_has_no_such_reason():
     bench.wait()
     bench.fly(3.0, 200)
     assert (bench.status.state, bench.status.reason) == ("arrived", "")
+
+
+def test_an_arrival_tells_how_far_and_how_much_lower_the_mark_is():
+    bench = Bench(**STEEP)
+    goal = dataclasses.replace(go(p_WG=(8.0, 0.0, 5.0)), p_WT=(38.0, 0.0, 1.0), partial=True)
+    bench.give("goal", goal)
+    bench.wait()
+    bench.fly(3.0, 200)
+    status, (x, y, z) = bench.status, bench.position
+    assert (status.state, status.reason) == ("arrived", ON_THE_WAY)
+    assert status.remaining == pytest.approx(math.dist((x, y, z), (38.0, 0.0, 1.0)))
+    assert status.height == pytest.approx(1.0 - z)
+    assert Outcome(status.state, status.reason).words == "on the way"

@@ -137,7 +137,7 @@ class Aircraft(Level):
         if status.terminal and status.n == state.panorama.n:
             seen = panorama(
                 status.n + 1, state.position, state.yaw,
-                Outcome(status.state, status.reason, status.remaining),
+                Outcome(status.state, status.reason, status.remaining, status.height),
             )  # fmt: skip
             return dataclasses.replace(state, panorama=seen)
         goal = self._goal(context)

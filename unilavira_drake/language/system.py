@@ -72,6 +72,7 @@ class Language(Level):
         view_detail: how finely the model looks at the four views, see ``ImagePart``.
         history_detail: how finely it looks at pictures of the past.
         stairs_barred: whether the prompt says that there are stairs and this robot takes none.
+        reach: how far one move goes in flight, metres.
     """
 
     def __init__(
@@ -85,11 +86,13 @@ class Language(Level):
         view_detail: str = "medium",
         history_detail: str = "low",
         stairs_barred: bool = False,
+        reach: float = 0.0,
     ) -> None:
         super().__init__(LanguageState(), period=period)
         self._seed = seed
         self._can_climb = can_climb
         self._stairs_barred = stairs_barred
+        self._reach = reach
         self._free_distance = free_distance
         self._detector = detector
         self._view_detail = view_detail
@@ -151,6 +154,7 @@ class Language(Level):
             people=self._people.optional(context),
             time=context.get_time(),
             stairs_barred=self._stairs_barred,
+            reach=self._reach,
         )
         return dataclasses.replace(state, request=request)
 

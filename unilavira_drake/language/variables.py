@@ -59,6 +59,7 @@ def language_request(
     people: PeopleTracks | None = None,
     time: float = 0.0,
     stairs_barred: bool = False,
+    reach: float = 0.0,
 ) -> MllmRequest:
     """Returns the first attempt of call ``panorama.n``.
 
@@ -102,6 +103,7 @@ def language_request(
         choices=task.choices,
         forgotten=_forgotten(history),
         in_flight=panorama.in_flight,
+        reach=reach if panorama.in_flight else 0.0,
         compass=round(90.0 - math.degrees(panorama.yaw)) % 360.0 if panorama.in_flight else 0.0,
         bearings=direction_note(task.text, last_action, panorama, history)
         if call in ("decide", "recover")

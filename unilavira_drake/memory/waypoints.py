@@ -20,6 +20,7 @@ from unilavira_drake.memory.pictures import (
 )
 from unilavira_drake.messages import (
     DOWN,
+    ON_THE_WAY,
     VIEW_YAW,
     DecisionRecord,
     Edge,
@@ -219,9 +220,15 @@ def _described(state: WaypointState, action: LanguageAction) -> WaypointState:
 def _told(panorama: Panorama, target: str) -> str:
     """Returns the outcome as the history tells it, with how far the target still is."""
     outcome = panorama.outcome
-    if outcome.remaining is None or not target:
+    if not target or (outcome.remaining is None and outcome.reason != ON_THE_WAY):
         return outcome.words
-    return f"{outcome.words}, {outcome.remaining:.1f} m from it"
+    if outcome.remaining is None:
+        return f"{outcome.words}, too far to measure"
+    told = f"{outcome.words}, {outcome.remaining:.1f} m from it"
+    if outcome.height is None:
+        return told
+    side = "higher" if outcome.height > 0 else "lower"
+    return f"{told} (it is {abs(outcome.height):.1f} m {side})"
 
 
 def _decided(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from unilavira_drake.messages.frozen import Message
+from unilavira_drake.messages.plans import ON_THE_WAY
 
 CAPTION_LENGTH = 160
 """Characters of a waypoint's target and scene together."""
@@ -93,8 +94,8 @@ class Edge(Message):
     n: int = 0
     """Number of the language action that took it."""
     outcome: str = ""
-    """``arrived`` (``arrived: already there`` without a drive), ``failed: ...`` or ``returned``
-    (left again by a backtrack)."""
+    """``arrived`` (``arrived: already there`` without a drive), ``on the way``, ``failed: ...`` or
+    ``returned`` (left again by a backtrack)."""
     to: int | None = None
     """The waypoint it led to; None when it led to none."""
     left: bool = False
@@ -105,7 +106,7 @@ class Edge(Message):
     @property
     def arrived(self) -> bool:
         """Whether the move ended well and was not given up since."""
-        return self.outcome.startswith("arrived")
+        return self.outcome.startswith(("arrived", ON_THE_WAY))
 
     @property
     def failed(self) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unilavira_drake.messages.frozen import Message, read_only
+from unilavira_drake.messages.plans import ON_THE_WAY
 
 DIRECTIONS = ("front", "left", "right", "back")
 """The four words of the language action, in the order in which they are offered."""
@@ -86,10 +87,14 @@ class Outcome(Message):
     reason: str = ""
     remaining: float | None = None
     """Metres to what was aimed at after a drive; None without one."""
+    height: float | None = None
+    """In flight, of ``remaining``: how much higher than the robot it is, metres."""
 
     @property
     def words(self) -> str:
-        """E.g. ``arrived`` or ``failed: stuck``."""
+        """E.g. ``arrived``, ``failed: stuck``, or ``on the way`` for a part of a flight."""
+        if self.reason == ON_THE_WAY:
+            return ON_THE_WAY
         return f"{self.state}: {self.reason}" if self.reason else self.state
 
 

@@ -60,6 +60,8 @@ class NavigationStatus(Message):
     remaining: float | None = None
     """Metres straight from the robot to the goal's ``p_WG`` at the end of a drive; None without
     one.  What was marked may stand on a table: the robot arrives as near as there is room."""
+    height: float | None = None
+    """In flight, of ``remaining``: how much higher than the robot it is, metres."""
 
     @property
     def terminal(self) -> bool:

@@ -14,7 +14,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from unilavira_drake.messages import Message, TodoItem
+from unilavira_drake.messages import ON_THE_WAY, Message, TodoItem
 from unilavira_drake.mllm.evidence import ViewEvidence
 
 
@@ -97,7 +97,8 @@ class LanguageVariables(Message):
     last_action: str = ""
     """The previous action and its outcome in words; empty at the first call."""
     outcome: str = ""
-    """``arrived`` | ``failed: reason`` of the previous action; empty at the first call."""
+    """``arrived`` | ``on the way`` (in flight) | ``failed: reason`` of the previous action; empty
+    at the first call."""
     rejection: str = ""
     """Why the last double check was rejected; empty when it was not."""
     todo: tuple[TodoItem, ...] | None = None
@@ -125,6 +126,8 @@ class LanguageVariables(Message):
     """Whether the robot flies: there is a view straight down."""
     people: bool = False
     """Whether people are told of beside the views."""
+    reach: float = 0.0
+    """In flight: how far one move goes, metres."""
     compass: float = 0.0
     """In flight: where ``front`` looks, degrees clockwise from north, which is the world's y."""
     bearings: DirectionNote | None = None
@@ -137,7 +140,7 @@ class LanguageVariables(Message):
             f"waypoint {note.id}, {text}"
             for note in self.waypoints
             for text in note.tried
-            if not text.partition(": ")[2].startswith("arrived")
+            if not text.partition(": ")[2].startswith(("arrived", ON_THE_WAY))
         )
 
 

@@ -383,7 +383,8 @@ def _arrived(
     done = _done(state, state.status.n, "arrived", state.reason, heading)
     if state.mark is None:
         return done
-    status = dc.replace(done.status, remaining=math.dist(position, state.mark))
+    away, height = math.dist(position, state.mark), state.mark[2] - position[2]
+    status = dc.replace(done.status, remaining=away, height=height)
     return dc.replace(done, status=status)
 
 

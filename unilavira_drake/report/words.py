@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from unilavira_drake.messages import ON_THE_WAY
 from unilavira_drake.report.model import Step
 
 _TOOLS = {
@@ -92,5 +93,7 @@ def outcome_words(step: Step) -> str:
     if step.goal is not None and step.goal.kind == "stay":
         return "Nothing to drive: the next call sees the same panorama."
     words = "Arrived" + (f": {step.status.reason}" if step.status.reason else "")
+    if step.status.reason == ON_THE_WAY:
+        words = ON_THE_WAY.capitalize()
     left = step.status.remaining
     return f"{words}." if left is None else f"{words}, {left:.1f} m from what was aimed at."

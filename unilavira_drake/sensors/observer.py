@@ -152,7 +152,7 @@ class Observer(Level):
         X_WB = pose_matrix(self._pose(context))
         yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
         n = status.n + 1
-        outcome = Outcome(status.state, status.reason, status.remaining)
+        outcome = Outcome(status.state, status.reason, status.remaining, status.height)
         heading = yaw if status.heading is None else status.heading
         if state.panorama.n > 0 and _at_rest_place(state, X_WB, yaw, status.heading):
             age = context.get_time() - state.panorama.time

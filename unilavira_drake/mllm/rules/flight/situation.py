@@ -115,7 +115,7 @@ class FlightSituation:
 
         Level views end above what is near, and the view straight down before it.
         """
-        way = rf" to '[^']*{re.escape(leg.landmark)}[^']*': arrived: {ON_THE_WAY}"
+        way = rf" to '[^']*{re.escape(leg.landmark)}[^']*': {ON_THE_WAY}"
         high = self.height > 2.0 * REACH
         return bool(leg.landmark) and high and bool(re.search(way, self.variables.last_action))
 
@@ -173,5 +173,5 @@ def _from_history(legs: Sequence[Leg], variables: LanguageVariables) -> list[Fli
 
 
 def _arrived_at(leg: Leg, decision: str) -> bool:
-    target = rf" to '[^']*{re.escape(leg.landmark)}[^']*': arrived(?!: {ON_THE_WAY})"
+    target = rf" to '[^']*{re.escape(leg.landmark)}[^']*': arrived"
     return re.search(target, decision) is not None
