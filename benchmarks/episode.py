@@ -40,6 +40,7 @@ from unilavira_drake.robots.governor import Governor
 from unilavira_drake.robots.ground_controller import GroundTrackingController
 from unilavira_drake.robots.planar_base import PlanarBase
 from unilavira_drake.robots.planar_pose import PlanarPose
+from unilavira_drake.robots.velocity_servo import VelocityServo
 
 CHUNK = 0.5
 """Simulated seconds in which the robot either moved or did not."""
@@ -56,6 +57,7 @@ CALLBACKS = (
     (GroundTrackingController, "_update", "control"),
     (Governor, "_update", "control"),
     (PlanarBase, "_calc_desired", "control"),
+    (VelocityServo, "_calc_actuation", "control"),
     (PlanarPose, "_calc_pose", "control"),
     (PlanarPose, "_calc_twist", "control"),
     (GoalSelector, "_calc_goal", "agent"),
