@@ -82,6 +82,9 @@ class Path(Message):
     """No faster than this, whatever the robot's limits, m/s: stairs are climbed slowly."""
     backwards: bool = False
     """Whether the robot goes it backwards, without turning, to get off where it is stuck."""
+    narrow: tuple[int, ...] = ()
+    """Segments, by the index of their first point, that lead straight through a gap in which an
+    aircraft does not turn."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))

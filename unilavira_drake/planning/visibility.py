@@ -74,6 +74,9 @@ class FlightParameters(Message):
     """A goal moves at most this far to free space, metres."""
     max_distance: float = 200.0
     """Targets farther than this are not looked for, metres."""
+    narrow_radius: float | None = None
+    """As much is kept free beside a gap's middle where there is no other way, metres; None: there
+    it does not fly."""
 
     def __post_init__(self) -> None:
         if not -math.inf < self.min_altitude < self.max_altitude < math.inf:
@@ -99,6 +102,10 @@ class FlightPlan(Message):
     length: float = 0.0
     """Metres."""
     reason: str = ""
+    elsewhere: bool = False
+    """Whether it ends where the aircraft gets, as there is no way to the goal."""
+    narrow: tuple[int, ...] = ()
+    """Segments on which only an aircraft that flies straight along them fits."""
 
 
 def make_flight_plan(
@@ -128,16 +135,15 @@ def make_flight_plan(
         return FlightPlan(reason=f"a position is not finite, or beyond {FARTHEST:g} m")
     if math.dist(position, target) > parameters.max_distance:
         return FlightPlan(reason=f"farther than {parameters.max_distance:g} m")
-    voxels = math.dist(position, target) / space.voxels.resolution
-    near, far = max(20, int(0.3 * voxels)), max(200, int(1.5 * voxels))
+    near, far = margins(position, target, space.voxels.resolution)
     reason = ""
     # The last resort is for goals whose larger box has too many voxels.
     for margin, elsewhere in ((near, False), (far, True), (near, True)):
-        window = _window(space, (position, target), margin, parameters)
+        window = window_around(space, (position, target), margin, parameters)
         if window is None:
             reason = reason or TOO_MANY
             continue
-        start = way_out(space, window, position, _escape(position, parameters))
+        start = way_out(space, window, position, escape(position, parameters))
         if start is None:
             return FlightPlan(reason=NO_WAY_OUT)
         places = (position, target, viewpoint, goal)
@@ -148,6 +154,12 @@ def make_flight_plan(
         if reason != (TOO_MANY if margin == far else UNREACHABLE):
             break
     return FlightPlan(reason=reason)
+
+
+def margins(position: Point, target: Point, resolution: float) -> tuple[int, int]:
+    """Returns how far around position and target a way is looked for first, and then; voxels."""
+    voxels = math.dist(position, target) / resolution
+    return max(20, int(0.3 * voxels)), max(200, int(1.5 * voxels))
 
 
 def _plan_in(
@@ -183,6 +195,7 @@ def _plan_in(
         return FlightPlan(reason=f"no free space within {parameters.snap_distance:g} m")
     slopes = parameters.slopes
     nodes = route(window, start, end, slopes)
+    found = None
     if not len(nodes):
         within_reach = reachable(window, start)
         other = elsewhere and within_reach.is_blocked(end)
@@ -197,7 +210,7 @@ def _plan_in(
     out = math.dist(p_WP[0], position)
     if out > 1e-9:
         p_WP = np.concatenate((np.array([position]), p_WP))
-    return FlightPlan(p_WP, length + out)
+    return FlightPlan(p_WP, length + out, elsewhere=found is not None)
 
 
 def route(
@@ -229,14 +242,14 @@ def route(
     return nodes
 
 
-def _escape(position: Point, parameters: FlightParameters) -> float:
+def escape(position: Point, parameters: FlightParameters) -> float:
     """Returns how far from the aircraft a free voxel is looked for, metres."""
     keep = parameters.clearance
     below = max(parameters.min_altitude - position[2], position[2] - parameters.max_altitude, 0.0)
     return below + keep.radius + max(keep.ground_margin, keep.ceiling_margin, 1.0) + 1.0
 
 
-def _window(
+def window_around(
     space: FlightSpace, points: tuple[Point, ...], margin: int, parameters: FlightParameters
 ) -> FlightWindow | None:
     """Returns the window around some points, or None if it would be too large."""

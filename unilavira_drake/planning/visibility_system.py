@@ -13,7 +13,6 @@ from unilavira_drake.messages import (
     ALREADY_THERE,
     ON_THE_WAY,
     Goal,
-    Message,
     NavigationStatus,
     Path,
     VoxelMap,
@@ -30,11 +29,23 @@ from unilavira_drake.planning.visibility import (
     FlightPlan,
     Point,
     believable,
-    make_flight_plan,
     warm_up,
 )
-from unilavira_drake.planning.visibility_path import path_is_blocked, remaining_way
+from unilavira_drake.planning.visibility_narrow import (
+    in_a_gap,
+    make_plan,
+    near_a_gap,
+    way_is_blocked,
+)
+from unilavira_drake.planning.visibility_narrow import warm_up as warm_up_gaps
+from unilavira_drake.planning.visibility_path import remaining_way
 from unilavira_drake.planning.visibility_space import Clearance, FlightSpace, update_space
+from unilavira_drake.planning.visibility_state import (
+    VisibilityPlannerState,
+    arrived,
+    done,
+    no_path,
+)
 from unilavira_drake.ports import Level, message_input, pose_input
 
 AIRSPACE_ENDS = "the airspace ends here"
@@ -50,38 +61,6 @@ FINAL_STRETCH = 2.0
 """Nearer to the goal than this only a blocked way is planned anew, metres."""
 
 
-@dc.dataclass(frozen=True, eq=False)
-class VisibilityPlannerState(Message):
-    """Status and path of one goal, and what it takes to watch its progress."""
-
-    status: NavigationStatus = NavigationStatus()
-    path: Path = dc.field(default_factory=Path)
-    heading: float | None = None
-    target: Point = (0.0, 0.0, 0.0)
-    """The selected point before snapping, metres."""
-    mark: Point | None = None
-    """The point of the surface that was marked, metres; None where none is known."""
-    reason: str = ""
-    """Why an arrival is not the end of the way."""
-    viewpoint: Point = (0.0, 0.0, 0.0)
-    """Where the aircraft was when the goal was given, metres."""
-    space: FlightSpace = dc.field(default_factory=FlightSpace)
-    """Where it may fly, by the latest map that was looked at."""
-    map_version: int = 0
-    """Version of the map of the latest plan."""
-    plan_time: float = 0.0
-    progress_time: float = 0.0
-    least_remaining: float = math.inf
-    position: Point = (0.0, 0.0, 0.0)
-    """Where travel was last added up, metres."""
-    travelled: float = 0.0
-    budget: float = 0.0
-    came: tuple[Point, ...] = ()
-    """Places that the aircraft came by, the latest first, metres."""
-    recoveries: int = 0
-    """How often it has backed off on the way to this goal."""
-
-
 class VisibilityPlanner(Level):
     """Plans through free space to each goal and reports ``arrived`` or ``failed`` with the reason.
 
@@ -90,6 +69,9 @@ class VisibilityPlanner(Level):
     altitudes is moved to the nearest place within.  Unknown space is taken to be free.  While
     the aircraft moves, the way is planned anew when a new map blocks it, or when the map changed,
     the plan is ``replan_period`` old and the goal is not near.  ``path`` carries (k, 3) points.
+
+    Where it cannot come with room to turn it is sent through gaps, straight and in their middle;
+    ``path.narrow`` tells where.  In a gap, and just before it, only a blocked way is planned anew.
 
     An aircraft that is stuck backs off once for each goal, by the places that it came by and
     without turning; then the way is planned anew.  Stuck again, it fails.
@@ -122,6 +104,8 @@ class VisibilityPlanner(Level):
         descend_angle: steepest path below the horizon, radians.
         snap_distance: a goal moves at most this far to free space, metres.
         max_distance: goals farther than this are refused, metres.
+        narrow_radius: kept free beside the middle of a gap that is passed straight, metres; None:
+            no gaps.
         tolerance: arrived within this distance of the snapped goal, metres.
         stuck_time: stuck after this long without progress, seconds.
         travel_factor: fails after this many times the planned length plus 10 m.
@@ -146,6 +130,7 @@ class VisibilityPlanner(Level):
         descend_angle: float = math.radians(45.0),
         snap_distance: float = 3.0,
         max_distance: float = 200.0,
+        narrow_radius: float | None = None,
         tolerance: float = 0.5,
         stuck_time: float = 6.0,
         travel_factor: float = 3.0,
@@ -160,10 +145,11 @@ class VisibilityPlanner(Level):
             descend_angle=descend_angle,
             snap_distance=snap_distance,
             max_distance=max_distance,
+            narrow_radius=narrow_radius,
         )
         space = FlightSpace(clearance=self._parameters.clearance)
         start = NavigationStatus(0, "arrived" if takeoff_altitude is None else "moving")
-        initial = VisibilityPlannerState(start, _no_path(0), space=space)
+        initial = VisibilityPlannerState(start, no_path(0), space=space)
         super().__init__(initial, period=period)
         x_min, y_min, x_max, y_max = geofence or (-math.inf, -math.inf, math.inf, math.inf)
         self._fence = ((x_min, x_max), (y_min, y_max), (min_altitude, max_altitude))
@@ -175,9 +161,10 @@ class VisibilityPlanner(Level):
         self._map = message_input(self, "voxel_map", VoxelMap())
         self._pose = pose_input(self, "pose_estimate")
         self._goal = message_input(self, "goal", Goal())
-        self.declare_output("path", lambda state: state.path, _no_path(0))
+        self.declare_output("path", lambda state: state.path, no_path(0))
         self.declare_output("navigation_status", lambda state: state.status, start)
         warm_up()
+        warm_up_gaps()
 
     def step(self, context: Context, state: Any) -> Any:
         """Returns the state after a new goal, a new map or some way flown; see the class."""
@@ -194,9 +181,9 @@ class VisibilityPlanner(Level):
         if voxels.n < goal.n:
             return state
         if goal.kind == "stay":
-            return _done(state, goal.n, "arrived", "", goal.heading)
+            return done(state, goal.n, "arrived", "", goal.heading)
         if goal.kind != "go" or goal.p_WG is None:
-            return _done(state, goal.n, "failed", goal.reason, None)
+            return done(state, goal.n, "failed", goal.reason, None)
         return self._begin(goal, state, voxels, self._position(context), time)
 
     def _position(self, context: Context) -> Point:
@@ -224,20 +211,21 @@ class VisibilityPlanner(Level):
     ) -> VisibilityPlannerState:
         assert goal.p_WG is not None
         if len(goal.p_WG) != 3:
-            return _done(state, goal.n, "failed", "the goal is not a point in space", None)
+            return done(state, goal.n, "failed", "the goal is not a point in space", None)
         x, y, z = (
             min(max(a, low), high) for a, (low, high) in zip(goal.p_WG, self._fence, strict=True)
         )
         beyond = math.dist((x, y, z), goal.p_WG) > self._tolerance
         fresh = VisibilityPlannerState(
             status=NavigationStatus(goal.n, "moving"),
-            path=_no_path(0),
+            path=no_path(0),
             heading=goal.heading,
             target=(x, y, z),
             mark=goal.p_WT,
             reason=AIRSPACE_ENDS if beyond else ON_THE_WAY if goal.partial else "",
             viewpoint=position,
             space=state.space,
+            tight=state.tight,
             progress_time=time,
             position=position,
             came=came_by(state.came, position, self._tolerance),
@@ -256,15 +244,12 @@ class VisibilityPlanner(Level):
         try:
             state = dc.replace(state, space=update_space(state.space, voxels))
         except ValueError as error:
-            return _done(state, n, "failed", str(error), None)
-        plan = make_flight_plan(
-            state.space,
-            position=position,
-            target=state.target,
-            viewpoint=state.viewpoint,
-            goal=goal,
-            parameters=self._parameters,
+            return done(state, n, "failed", str(error), None)
+        places = (position, state.target, state.viewpoint, goal)
+        plan, tight = make_plan(
+            state.space, state.tight, places=places, parameters=self._parameters
         )
+        state = dc.replace(state, tight=tight)
         return self._with_plan(state, plan, voxels, position, time)
 
     def _with_plan(
@@ -277,15 +262,15 @@ class VisibilityPlanner(Level):
     ) -> VisibilityPlannerState:
         n = state.status.n
         if plan.reason:
-            return _done(state, n, "failed", plan.reason, None)
+            return done(state, n, "failed", plan.reason, None)
         if plan.length <= self._tolerance:
             if state.path.n != n:
                 state = dc.replace(state, reason=ALREADY_THERE)
-            return _arrived(state, position, state.heading)
+            return arrived(state, position, state.heading)
         version = state.path.version + 1 if state.path.n == n else 0
         return dc.replace(
             state,
-            path=Path(n, version, plan.p_WP),
+            path=Path(n, version, plan.p_WP, narrow=plan.narrow),
             map_version=voxels.version,
             plan_time=time,
             # Not the time of progress: replanning alone must not hide that it is stuck.
@@ -298,13 +283,14 @@ class VisibilityPlanner(Level):
     ) -> VisibilityPlannerState:
         n, late = state.status.n, time - state.progress_time > self._stuck_time
         if not believable(position):
-            return _done(state, n, "failed", "the pose is lost", None) if late else state
+            return done(state, n, "failed", "the pose is lost", None) if late else state
         x, y, z = (float(value) for value in state.path.p_WP[-1])
-        if math.dist(position, (x, y, z)) <= self._tolerance:
+        near = math.dist(position, (x, y, z)) <= self._tolerance
+        if near and not in_a_gap(state.path, position):
             # Nobody came from anywhere by a climb at the start.
             came = _arrival(state.path) if n > 0 else None
             heading = came if state.heading is None else state.heading
-            return _arrived(state, position, heading)
+            return arrived(state, position, heading)
         step = math.dist(position, state.position)
         if step >= PROGRESS:
             state = dc.replace(
@@ -314,7 +300,7 @@ class VisibilityPlanner(Level):
                 came=came_by(state.came, position, self._tolerance),
             )
         if state.travelled > state.budget:
-            return _done(state, n, "failed", "travel budget", None)
+            return done(state, n, "failed", "travel budget", None)
         remaining, _ = remaining_way(state.path.p_WP, position)
         if remaining <= state.least_remaining - PROGRESS:
             state = dc.replace(state, least_remaining=remaining, progress_time=time)
@@ -323,7 +309,7 @@ class VisibilityPlanner(Level):
             again = state.recoveries + 1
             return dc.replace(state, path=back, plan_time=time, recoveries=again)
         elif late:
-            return _done(state, n, "failed", "stuck", None)
+            return done(state, n, "failed", "stuck", None)
         return self._replanned(state, voxels, position, (x, y, z), time)
 
     def _back_off(
@@ -332,7 +318,7 @@ class VisibilityPlanner(Level):
         """Returns the state with a new plan once the aircraft has backed off."""
         waited = time - state.plan_time >= BACK_OFF_TIME
         if not believable(position):
-            lost = _done(state, state.status.n, "failed", "the pose is lost", None)
+            lost = done(state, state.status.n, "failed", "the pose is lost", None)
             return lost if waited else state
         if not waited and math.dist(position, state.path.p_WP[-1]) > self._tolerance:
             return state
@@ -350,16 +336,17 @@ class VisibilityPlanner(Level):
             return state
         due = time - state.plan_time >= self._replan_period - 1e-9
         due = due and math.dist(position, goal) > FINAL_STRETCH
-        if due:
+        if due and not near_a_gap(state.path, position):
             return self._planned(state, voxels, position, goal, time)
         if voxels is state.space.voxels:
             return state
         try:
             space = update_space(state.space, voxels)
         except ValueError as error:
-            return _done(state, state.status.n, "failed", str(error), None)
+            return done(state, state.status.n, "failed", str(error), None)
         state = dc.replace(state, space=space)
-        if not path_is_blocked(space, state.path.p_WP, position=position):
+        radius = self._parameters.narrow_radius
+        if not way_is_blocked(space, state.path, position=position, narrow_radius=radius):
             return state
         return self._planned(state, voxels, position, goal, time)
 
@@ -370,31 +357,3 @@ def _arrival(path: Path) -> float | None:
     if float(np.ptp(flat, axis=0).max()) < PROGRESS:
         return None
     return final_heading(flat)
-
-
-def _no_path(n: int) -> Path:
-    return Path(n, p_WP=np.zeros((0, 3)))
-
-
-def _arrived(
-    state: VisibilityPlannerState, position: Point, heading: float | None
-) -> VisibilityPlannerState:
-    """Returns the terminal state of an arrival, with how far the mark still is."""
-    done = _done(state, state.status.n, "arrived", state.reason, heading)
-    if state.mark is None:
-        return done
-    away, height = math.dist(position, state.mark), state.mark[2] - position[2]
-    status = dc.replace(done.status, remaining=away, height=height)
-    return dc.replace(done, status=status)
-
-
-def _done(
-    state: VisibilityPlannerState, n: int, outcome: str, reason: str, heading: float | None
-) -> VisibilityPlannerState:
-    """Returns the terminal state of goal n: its status and the empty path, in one message."""
-    return VisibilityPlannerState(
-        status=NavigationStatus(n, outcome, reason, heading),
-        path=_no_path(n),
-        space=state.space,
-        came=state.came,
-    )

@@ -1,0 +1,283 @@
+"""Ways through gaps in which an aircraft cannot turn, for goals that cannot be reached otherwise.
+
+What can be reached with room to turn falls into regions that such gaps connect.  A search with
+less kept free tells through which gaps to go; each is then passed on the best line through it,
+and between the gaps the way is one with room to turn.
+"""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import itertools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unilavira_drake.messages import Path
+from unilavira_drake.planning import visibility_gaps
+from unilavira_drake.planning.visibility import (
+    NO_WAY_OUT,
+    TOO_MANY,
+    UNREACHABLE,
+    FlightParameters,
+    FlightPlan,
+    Point,
+    escape,
+    make_flight_plan,
+    margins,
+    route,
+    window_around,
+)
+from unilavira_drake.planning.visibility_gaps import best_line, free_beside
+from unilavira_drake.planning.visibility_lines import unfold
+from unilavira_drake.planning.visibility_path import path_is_blocked, remaining_way
+from unilavira_drake.planning.visibility_snapping import snap_goal, way_out
+from unilavira_drake.planning.visibility_space import Clearance, FlightSpace, update_space
+from unilavira_drake.planning.visibility_window import FlightWindow, reachable
+
+BEFORE_A_GAP = 1.0
+"""Who is nearer to a gap than this does not plan anew without need, metres."""
+
+MOST_GAPS = 8
+"""So many gaps are looked at that turn out to be too narrow."""
+
+Places = tuple[Point, Point, Point, "Point | None"]
+"""Position, target, viewpoint, and the goal snapped before."""
+
+
+def narrow_clearance(clearance: Clearance, narrow_radius: float, resolution: float) -> Clearance:
+    """Returns what the search for gaps keeps free.
+
+    Bits keep up to a voxel more than they are asked for; what is too narrow is found out later.
+    """
+    return dc.replace(clearance, radius=max(narrow_radius - resolution, 0.0))
+
+
+def make_plan(
+    space: FlightSpace, tight: FlightSpace, *, places: Places, parameters: FlightParameters
+) -> tuple[FlightPlan, FlightSpace]:
+    """Returns a plan with room to turn, or one through gaps where there is no other.
+
+    Args:
+        space: where the aircraft may fly and turn.
+        tight: where the latest search for gaps took place; the new one is returned.
+        places: as those of :func:`make_flight_plan`.
+        parameters: size and limits.
+    """
+    position, target, viewpoint, goal = places
+    plan = make_flight_plan(
+        space,
+        position=position,
+        target=target,
+        viewpoint=viewpoint,
+        goal=goal,
+        parameters=parameters,
+    )
+    wanted = plan.reason == UNREACHABLE or plan.elsewhere
+    if parameters.narrow_radius is None or not wanted:
+        return plan, tight
+    resolution = space.voxels.resolution
+    clearance = narrow_clearance(space.clearance, parameters.narrow_radius, resolution)
+    if tight.clearance != clearance:
+        tight = FlightSpace(clearance=clearance)
+    tight = update_space(tight, space.voxels)
+    through = make_plan_through_gaps(space, tight, places=places, parameters=parameters)
+    return (plan if through.reason else through), tight
+
+
+def make_plan_through_gaps(
+    space: FlightSpace, tight: FlightSpace, *, places: Places, parameters: FlightParameters
+) -> FlightPlan:
+    """Returns a plan to the free space nearest to a target that leads through gaps.
+
+    Args:
+        space: where the aircraft may fly and turn.
+        tight: the same with what the search for gaps keeps free.
+        places: as those of :func:`make_flight_plan`.
+        parameters: size and limits, with a narrow radius.
+    """
+    position, target, viewpoint, goal = places
+    reason = UNREACHABLE
+    for margin in margins(position, target, space.voxels.resolution):
+        window = window_around(space, (position, target), margin, parameters)
+        wider = window_around(tight, (position, target), margin, parameters)
+        if window is None or wider is None:
+            return FlightPlan(reason=TOO_MANY)
+        start = way_out(space, window, position, escape(position, parameters))
+        if start is None:
+            return FlightPlan(reason=NO_WAY_OUT)
+        end = None if goal is None else window.point(goal)
+        if end is None or window.is_blocked(end):
+            end = snap_goal(
+                space,
+                window,
+                target=target,
+                position=position,
+                viewpoint=viewpoint,
+                max_distance=parameters.snap_distance,
+            )
+        if end is None:
+            return FlightPlan(reason=f"no free space within {parameters.snap_distance:g} m")
+        plan = _through_gaps(space, window, wider, start, end, parameters)
+        if not plan.reason:
+            return _from(position, plan)
+        reason = plan.reason
+    return FlightPlan(reason=reason)
+
+
+def _from(position: Point, plan: FlightPlan) -> FlightPlan:
+    """Returns a plan that begins at the aircraft."""
+    out = math.dist(plan.p_WP[0], position)
+    if out <= 1e-9:
+        return plan
+    p_WP = np.concatenate((np.array([position]), plan.p_WP))
+    return FlightPlan(p_WP, plan.length + out, narrow=tuple(k + 1 for k in plan.narrow))
+
+
+def _through_gaps(
+    space: FlightSpace,
+    window: FlightWindow,
+    wider: FlightWindow,
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    parameters: FlightParameters,
+) -> FlightPlan:
+    words = wider.words.copy()
+    for _ in range(MOST_GAPS):
+        nodes = route(FlightWindow(wider.low, wider.resolution, words), start, end,
+                      parameters.slopes)  # fmt: skip
+        if not len(nodes):
+            break
+        legs = _legs(space, window, nodes, parameters)
+        if isinstance(legs, FlightPlan):
+            return legs
+        # No such gap: its voxels are none that lead anywhere.
+        _close(words, window.words, legs)
+    return FlightPlan(reason=UNREACHABLE)
+
+
+def _legs(
+    space: FlightSpace,
+    window: FlightWindow,
+    nodes: NDArray[np.float64],
+    parameters: FlightParameters,
+) -> FlightPlan | NDArray[np.float64]:
+    """Returns the plan that goes through the gaps of a way, or the points in one too narrow."""
+    assert parameters.narrow_radius is not None
+    points = _points_along(nodes)
+    open_to_turn = [not window.is_blocked(point) for point in points]
+    here, k = nodes[0], 0
+    legs: list[NDArray[np.float64]] = []
+    while True:
+        region = reachable(window, here)
+        if not region.is_blocked(nodes[-1]):
+            break
+        inside = [i for i in range(k, len(points)) if not region.is_blocked(points[i])]
+        last = inside[-1] if inside else k
+        rest = (i for i in range(last + 1, len(points)) if open_to_turn[i])
+        k = next(rest, len(points) - 1)
+        gap = points[last : k + 1]
+        line, free = best_line(space, gap, region, reachable(window, points[k]))
+        if free < parameters.narrow_radius - 1e-6:
+            return gap
+        legs += [_leg(window, here, line[0], parameters), line]
+        here = line[1]
+    legs.append(_leg(window, here, nodes[-1], parameters))
+    if not all(map(len, legs)):
+        return FlightPlan(reason=TOO_MANY)
+    return _joined(window, legs, parameters)
+
+
+def _leg(
+    window: FlightWindow,
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    parameters: FlightParameters,
+) -> NDArray[np.float64]:
+    if math.dist(a, b) < 1e-9:
+        return a[None]
+    return route(window, a, b, parameters.slopes)
+
+
+def _joined(
+    window: FlightWindow, legs: list[NDArray[np.float64]], parameters: FlightParameters
+) -> FlightPlan:
+    """Returns the plan of legs of which every other one leads through a gap."""
+    p_WP, narrow = [window.world(legs[0][0])], []
+    for number, leg in enumerate(legs):
+        if number % 2:
+            narrow.append(len(p_WP) - 1)
+            way = leg
+        else:
+            way = unfold(window.words, leg, parameters.slopes) if len(leg) > 1 else leg
+        for point in window.world(way):
+            if math.dist(point, p_WP[-1]) > 1e-9:
+                p_WP.append(point)
+    path = np.array(p_WP)
+    length = sum(math.dist(a, b) for a, b in itertools.pairwise(path))
+    return FlightPlan(path, length, narrow=tuple(narrow))
+
+
+def _points_along(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns points along a way, at most a voxel from one another; (k, 3)."""
+    parts = [nodes[:1]]
+    for a, b in itertools.pairwise(nodes):
+        count = max(math.ceil(float(np.linalg.norm(b - a))), 1)
+        parts.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
+    return np.concatenate(parts)
+
+
+def _close(
+    words: NDArray[np.uint32], blocked: NDArray[np.uint32], gap: NDArray[np.float64]
+) -> None:
+    """Blocks the voxels around points of a gap that are no room to turn."""
+    for x, y, _ in np.floor(gap).astype(int):
+        around = (slice(max(x - 1, 0), x + 2), slice(max(y - 1, 0), y + 2))
+        words[around] |= blocked[around]
+
+
+def way_is_blocked(
+    space: FlightSpace, path: Path, *, position: Point, narrow_radius: float | None
+) -> bool:
+    """Returns whether something is in the rest of a path: of its gaps, or of the way between."""
+    if narrow_radius is None or not path.narrow:
+        return path_is_blocked(space, path.p_WP, position=position)
+    _, ahead = remaining_way(path.p_WP, position)
+    way = [np.array(position)]
+    for k in range(max(ahead - 1, 0), len(path.p_WP) - 1):
+        a, b = path.p_WP[k], path.p_WP[k + 1]
+        if k not in path.narrow:
+            way.append(b)
+            continue
+        if free_beside(space, a, b) < narrow_radius - 1e-6:
+            return True
+        if len(way) > 1 and _blocked(space, way):
+            return True
+        way = [b]
+    return len(way) > 1 and _blocked(space, way)
+
+
+def _blocked(space: FlightSpace, way: list[NDArray[np.float64]]) -> bool:
+    x, y, z = way[0].tolist()
+    return path_is_blocked(space, np.array(way), position=(x, y, z))
+
+
+def in_a_gap(path: Path, position: Point) -> bool:
+    """Returns whether an aircraft is on its way through a gap."""
+    return bool(path.narrow) and remaining_way(path.p_WP, position)[1] - 1 in path.narrow
+
+
+def near_a_gap(path: Path, position: Point) -> bool:
+    """Returns whether an aircraft is in a gap, or soon will be."""
+    if not path.narrow:
+        return False
+    _, ahead = remaining_way(path.p_WP, position)
+    if ahead - 1 in path.narrow:
+        return True
+    return ahead in path.narrow and math.dist(path.p_WP[ahead], position) < BEFORE_A_GAP
+
+
+def warm_up() -> None:
+    """Compiles the kernels, or loads them from numba's cache."""
+    visibility_gaps.warm_up()
