@@ -61,7 +61,7 @@ def make_flight_navigation(
         # At rest the map is renewed once per rest period; half a period more is a late map.
         lambda: FlightGovernor(
             limits=limits,
-            radius=0.5 * math.hypot(robot.length, robot.width),
+            size=(robot.length, robot.width),
             fence=fence_of(flight),
             offset=time_step,
             map_timeout=1.5 * flight.rest_period,

@@ -15,14 +15,15 @@ LIMITS = FlightLimits()
 POINT = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.5, 4))
 
 
-def flown(path, *, start=None, yaw=0.0, ticks=1500, backwards=False):
+def flown(path, *, start=None, yaw=0.0, ticks=1500, backwards=False, narrow=()):
     """Rolls the reference out with an aircraft that is always where it should be."""
     path = np.array(path, float)
+    gaps = np.isin(np.arange(len(path)), narrow)
     reference = np.array([*(path[0] if start is None else start), yaw, 0.0, 0.0, 0.0])
     rows, travelled = [reference], math.nan
     for _ in range(ticks):
         *moved, travelled = follow(
-            path, reference, reference[:3], reference[3], travelled, backwards, 4.0, LIMITS
+            path, gaps, reference, reference[:3], reference[3], travelled, backwards, 4.0, LIMITS
         )
         reference = np.array(moved)
         rows.append(reference)
@@ -104,7 +105,7 @@ def test_it_waits_for_an_aircraft_that_is_held_up():
     reference, travelled = np.array([0.0, 0, 1, 0, 0, 0, 0]), math.nan
     for _ in range(400):
         hangs = (reference, np.array([0.0, 0, 1]), 0.0, travelled, False)
-        *moved, travelled = follow(path, *hangs, 4.0, LIMITS)
+        *moved, travelled = follow(path, np.zeros(2, np.bool_), *hangs, 4.0, LIMITS)
         reference = np.array(moved)
     assert reference[0] <= 1.05
     assert abs(reference[4]) < 1e-3

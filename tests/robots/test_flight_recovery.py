@@ -59,7 +59,7 @@ class StuckFlight:
         )
         controller = builder.AddSystem(FlightController(limits=limits, max_yaw_acceleration=4.0))
         governor = builder.AddSystem(
-            FlightGovernor(limits=limits, radius=0.27, fence=fence, map_timeout=np.inf)
+            FlightGovernor(limits=limits, size=(0.38, 0.38), fence=fence, map_timeout=np.inf)
         )
         builder.Connect(self.planner.GetOutputPort("path"), controller.GetInputPort("path"))
         builder.Connect(

@@ -19,7 +19,8 @@ from unilavira_drake.robots.wind import STILL_AIR, WindModel
 SLOW = Quadrotor()
 QUICK = Quadrotor(max_speed=2.0)
 FAST = Quadrotor(max_speed=5.0, max_climb_speed=3.0, max_descent_speed=2.0, max_acceleration=2.5)
-RADIUS = 0.5 * math.hypot(SLOW.length, SLOW.width)
+SIZE = (SLOW.length, SLOW.width)
+RADIUS = 0.5 * math.hypot(*SIZE)
 MARGIN = 0.02
 HOVER = 6.0
 """Until then it hovers at its start, seconds."""
@@ -62,7 +63,7 @@ class GovernedFlight:
             robot.control_period,
         )
         governor = FlightGovernor(
-            limits=limits, radius=RADIUS, fence=fence, command_timeout=np.inf, map_timeout=np.inf
+            limits=limits, size=SIZE, fence=fence, command_timeout=np.inf, map_timeout=np.inf
         )
         builder.AddSystem(governor)
         for name, port in (("pose_estimate", "cheat_X_WB"), ("twist", "twist")):

@@ -19,9 +19,9 @@ class FlightController(LeafSystem):
     """Moves a setpoint along the path; its state is the setpoint before.
 
     It follows ``path`` iff path.n >= sweep.n and the path is not empty, nose ahead unless it is
-    one to go backwards; else the setpoint comes
-    to rest, and turns to the heading of an active ``sweep``.  Until a pose is finite there is no
-    setpoint, and after a pose that is none the setpoint comes to rest.
+    one to go backwards, through gaps slowly and in line; else the setpoint comes to rest, and
+    turns to the heading of an active ``sweep``.  Until a pose is finite there is no setpoint, and
+    after a pose that is none the setpoint comes to rest.
 
     .. pydrake_system::
 
@@ -79,7 +79,9 @@ class FlightController(LeafSystem):
             if (path.n, path.version) != (n, version):
                 travelled = math.nan
             points = frozen_view(path.p_WP, np.float64)
-            way = (reference, p_WB, yaw, travelled, path.backwards)
+            narrow = np.zeros(len(points), np.bool_)
+            narrow[list(path.narrow)] = True
+            way = (frozen_view(narrow, np.bool_), reference, p_WB, yaw, travelled, path.backwards)
             *moved, travelled = follow(points, *way, *rates).tolist()
             reference = np.array(moved)
             place = np.array([path.n, path.version, travelled])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from unilavira_drake.messages import VoxelMap
 from unilavira_drake.messages.voxels import TILE, tiles_between
 from unilavira_drake.ports import message_input, pose_input, vector_input
 from unilavira_drake.robots.awaited_replies import AwaitedReplies
+from unilavira_drake.robots.flight_footprint import Size, half_width, turn_meets
+from unilavira_drake.robots.flight_footprint import warm_up as warm_up_footprint
 from unilavira_drake.robots.flight_limits import FlightLimits
 from unilavira_drake.robots.flight_stopping import (
     braked,
@@ -25,6 +28,8 @@ from unilavira_drake.robots.flight_stopping import (
 )
 from unilavira_drake.robots.stopping import stoppable_speed
 
+BESIDE = 0.01
+"""Kept free beside the aircraft, metres."""
 LEASH = 1.5
 """The setpoint is never farther from the aircraft than this, metres."""
 BRAKING_SHARE = 0.8
@@ -47,7 +52,9 @@ class FlightGovernor(LeafSystem):
     * The setpoint moves only so fast that it still stops, after v^2 / 2a and one period, with the
       standoff left before the aircraft around it meets an occupied voxel.  Unknown space counts
       as free: no camera looks up, so a climb is checked only against what was mapped before.
-    * The aircraft may always turn on the spot.
+      Beside its way so much is free as the aircraft is wide for its yaw: less in a gap through
+      which it flies straight than where it turns.
+    * It turns on the spot unless its corners would meet an occupied voxel.
 
     The state is the setpoint, NaN until pose and command are known and finite ever after, and when
     the pose last changed.
@@ -69,7 +76,7 @@ class FlightGovernor(LeafSystem):
 
     Args:
         limits: of the aircraft; the update period is among them.
-        radius: kept free around the setpoint in the direction of flight, metres.
+        size: length along the nose and width of the aircraft, metres.
         fence: (2, 3), lowest and highest x, y, z of the setpoint, metres.
         offset: time of the first update, seconds; a little after the controller's.
         standoff: that stays free before the setpoint's aircraft, metres: the true one comes to
@@ -84,7 +91,7 @@ class FlightGovernor(LeafSystem):
         self,
         *,
         limits: FlightLimits,
-        radius: float,
+        size: Size,
         fence: NDArray[np.float64],
         offset: float = 0.005,
         standoff: float = 0.25,
@@ -95,8 +102,10 @@ class FlightGovernor(LeafSystem):
     ) -> None:
         super().__init__()
         warm_up()
+        warm_up_footprint()
         self._limits = limits
-        self._radius = radius
+        self._size = size
+        self._radius = 0.5 * math.hypot(*size)
         self._fence = np.array(fence, np.float64)
         self._standoff = standoff
         self._command_timeout = command_timeout
@@ -140,11 +149,15 @@ class FlightGovernor(LeafSystem):
             if distance > leash:
                 setpoint[:3] = p_WB + behind * (min(leash, LEASH) / distance)
         followed = valid and not lost
-        v = self._velocity(context, setpoint, np.array(desired[:7]) if followed else None)
+        # The setpoint's aircraft is as wide as the true one if that is turned farther.
+        yaws = (float(setpoint[3]), math.atan2(X_WB[1, 0], X_WB[0, 0]) if seen else math.nan)
+        v = self._velocity(context, setpoint, yaws, np.array(desired[:7]) if followed else None)
         setpoint[4:] = v
         setpoint[:3] += self._limits.period * v
         if valid:
-            setpoint[3] = next_yaw(setpoint[3], wish[3], self._limits)
+            yaw = next_yaw(setpoint[3], wish[3], self._limits)
+            if self._may_turn(self._map(context), setpoint, yaw):
+                setpoint[3] = yaw
         discrete_state.set_value(self._setpoint_index, setpoint)  # type: ignore[arg-type]
 
     def _obeyed(self, context: Context, desired: list[float]) -> bool:
@@ -166,7 +179,11 @@ class FlightGovernor(LeafSystem):
         return math.isnan(speed) or (speed > MOVING and time - since > self._pose_timeout)
 
     def _velocity(
-        self, context: Context, setpoint: NDArray[np.float64], desired: NDArray[np.float64] | None
+        self,
+        context: Context,
+        setpoint: NDArray[np.float64],
+        yaws: tuple[float, float],
+        desired: NDArray[np.float64] | None,
     ) -> NDArray[np.float64]:
         """Returns how the setpoint may move for one period, m/s."""
         limits = self._limits
@@ -180,7 +197,9 @@ class FlightGovernor(LeafSystem):
         map_ = self._map(context)
         if context.get_time() - map_.time > self._map_timeout:
             return slower
-        allowed = self._allowed_speed(map_, setpoint[:3], v / speed, speed)
+        direction = v / speed
+        beside = max(half_width(self._size, yaw, direction) for yaw in yaws if not math.isnan(yaw))
+        allowed = self._allowed_speed(map_, setpoint[:3], direction, speed, beside + BESIDE)
         if allowed >= speed:
             return v
         v = v * (allowed / speed)
@@ -195,22 +214,39 @@ class FlightGovernor(LeafSystem):
         p: NDArray[np.float64],
         direction: NDArray[np.float64],
         speed: float,
+        beside: float,
     ) -> float:
         period, braking = self._limits.period, BRAKING_SHARE * self._limits.max_braking
         stopping = speed**2 / (2.0 * braking) + speed * period
         horizon = stopping + self._standoff
-        reach, resolution = self._radius, map_.resolution
-        bounds = voxels_ahead(p, direction, horizon, reach, resolution)
-        i, j, k, *beyond = bounds.tolist()
+        bounds = voxels_ahead(p, direction, horizon, self._radius, map_.resolution)
+        way = (p, direction, horizon, self._radius, beside)
         free = horizon
-        for key in tiles_between((i, j, k), (beyond[0], beyond[1], beyond[2])):
-            tile = map_.tiles.get(key)
-            if tile is None:
-                continue
-            voxels = frozen_view(tile, np.int8)
-            corner = (TILE * key[0], TILE * key[1], TILE * key[2])
-            way = (p, direction, horizon, self._radius)
-            free = min(free, free_flight(voxels, corner, bounds, resolution, *way))
+        for voxels, corner in _tiles(map_, bounds):
+            free = min(free, free_flight(voxels, corner, bounds, map_.resolution, *way))
         if free >= horizon:
             return speed
         return float(stoppable_speed(free - self._standoff, braking, period))
+
+    def _may_turn(self, map_: VoxelMap, setpoint: NDArray[np.float64], yaw: float) -> bool:
+        """Whether the aircraft at the setpoint meets nothing new when it turns."""
+        if abs(yaw - setpoint[3]) < 1e-9:
+            return True
+        p = setpoint[:3].copy()
+        bounds = voxels_ahead(p, np.zeros(3), 0.0, self._radius, map_.resolution)
+        turn = (p, float(setpoint[3]), float(yaw), self._size)
+        return not any(
+            turn_meets(voxels, corner, bounds, map_.resolution, *turn)
+            for voxels, corner in _tiles(map_, bounds)
+        )
+
+
+def _tiles(
+    map_: VoxelMap, bounds: NDArray[np.int64]
+) -> Iterator[tuple[NDArray[np.int8], tuple[int, int, int]]]:
+    """Yields the tiles of a box of voxels, each with its lowest voxel."""
+    i, j, k, *beyond = bounds.tolist()
+    for key in tiles_between((i, j, k), (beyond[0], beyond[1], beyond[2])):
+        tile = map_.tiles.get(key)
+        if tile is not None:
+            yield frozen_view(tile, np.int8), (TILE * key[0], TILE * key[1], TILE * key[2])

@@ -2,6 +2,9 @@
 
 The reference stays on the path and never outruns the aircraft: it slows down for corners, for the
 end, for climbs, while the aircraft lags behind, and while the nose does not yet point ahead.
+
+Through a gap in which there is no room to turn it goes slowly, with the nose along the way until
+the aircraft is out of it.  Before one it waits until the aircraft is in line with it.
 """
 
 from __future__ import annotations
@@ -34,6 +37,14 @@ radians."""
 LOOKAHEAD_TIME = 1.0
 MIN_LOOKAHEAD = 0.5
 """The nose points to where the reference will be after that time, at least so many metres on."""
+
+NARROW_SPEED = 0.3
+"""In a gap it is no faster than this, m/s."""
+GATE = 0.05
+"""It waits at most this far before a gap, metres, ..."""
+IN_LINE = 0.03
+NOSE_IN_LINE = 0.05
+"""... until the aircraft is no farther off the line, metres, nor its nose, radians."""
 
 
 @kernel
@@ -103,10 +114,56 @@ def corner_speed(
 
 
 @kernel
+def gap_at(
+    p_WP: NDArray[np.float64],
+    narrow: NDArray[np.bool_],
+    segment: int,
+    along: float,
+    p_WB: NDArray[np.float64],
+) -> int:
+    """Returns the narrow segment in or before which reference or aircraft are; -1: none.
+
+    Args:
+        p_WP: (k, 3) the path, metres.
+        narrow: (k,) which of its segments are.
+        segment: on which the reference is, ...
+        along: ... so far, metres.
+        p_WB: (3,) where the aircraft is.
+    """
+    if narrow[segment]:
+        return segment
+    if segment > 0 and narrow[segment - 1]:
+        # The reference leaves a gap before the aircraft does.
+        step = p_WP[segment] - p_WP[segment - 1]
+        if np.sum((p_WB - p_WP[segment]) * step) < 0.0:
+            return segment - 1
+    if segment + 1 < len(p_WP) and narrow[segment + 1]:
+        step = p_WP[segment + 1] - p_WP[segment]
+        if math.sqrt(np.sum(step * step)) - along < GATE:
+            return segment + 1
+    return -1
+
+
+@kernel
+def off_line(p_WP: NDArray[np.float64], segment: int, p_WB: NDArray[np.float64]) -> float:
+    """Returns how far a point is from the line of a segment, metres."""
+    step = p_WP[segment + 1] - p_WP[segment]
+    off = p_WB - p_WP[segment]
+    off = off - step * (np.sum(off * step) / max(np.sum(step * step), 1e-12))
+    return math.sqrt(np.sum(off * off))
+
+
+@kernel
 def _speed_ahead(
-    p_WP: NDArray[np.float64], segment: int, along: float, acceleration: float, limits: FlightLimits
+    p_WP: NDArray[np.float64],
+    narrow: NDArray[np.bool_],
+    segment: int,
+    along: float,
+    in_line: bool,
+    acceleration: float,
+    limits: FlightLimits,
 ) -> float:
-    """Returns the speed from which every corner, slope and the end can still be met, m/s."""
+    """Returns the speed from which every corner, slope, gap and the end can still be met, m/s."""
     speed, distance = np.inf, -along
     before = np.zeros(3)
     for i in range(segment, len(p_WP) - 1):
@@ -116,6 +173,11 @@ def _speed_ahead(
             continue
         direction = step / length
         bound = speed_along(direction, limits)
+        if narrow[i]:
+            bound = min(bound, NARROW_SPEED)
+            if distance > -GATE and not in_line:
+                stop = braking_speed(max(distance, 0.0), acceleration, limits.period)
+                return min(speed, stop)
         if distance > 0.0:
             bound = min(bound, corner_speed(before, direction, acceleration))
             bound = math.sqrt(bound**2 + 2.0 * acceleration * distance)
@@ -136,8 +198,15 @@ def turned(yaw: float, heading: float, max_yaw_acceleration: float, limits: Flig
 
 
 @kernel
+def _off(heading: float, yaw: float) -> float:
+    """Returns the angle between two headings, radians."""
+    return abs(math.atan2(math.sin(heading - yaw), math.cos(heading - yaw)))
+
+
+@kernel
 def follow(
     p_WP: NDArray[np.float64],
+    narrow: NDArray[np.bool_],
     reference: NDArray[np.float64],
     p_WB: NDArray[np.float64],
     yaw: float,
@@ -150,6 +219,7 @@ def follow(
 
     Args:
         p_WP: (k, 3) float64, k >= 1, metres in the world.
+        narrow: (k,) bool, for each of its segments whether there is no room to turn.
         reference: (7,) the one before.
         p_WB: (3,) where the aircraft is, metres.
         yaw: of the aircraft, radians.
@@ -163,16 +233,20 @@ def follow(
         travelled = project(p_WP, reference[:3])
     segment, along = locate(p_WP, travelled)
     previous = math.sqrt(np.sum(reference[4:7] ** 2))
-    speed = _speed_ahead(p_WP, segment, along, acceleration, limits)
+    gap = gap_at(p_WP, narrow, segment, along, p_WB)
+    heading, in_line = reference[3], False
+    if gap >= 0:
+        step = p_WP[gap + 1] - p_WP[gap]
+        heading = math.atan2(step[1], step[0])
+        in_line = off_line(p_WP, gap, p_WB) < IN_LINE and _off(heading, yaw) < NOSE_IN_LINE
+    speed = _speed_ahead(p_WP, narrow, segment, along, in_line, acceleration, limits)
     behind = math.sqrt(np.sum((reference[:3] - p_WB) ** 2))
     speed = min(speed, limits.max_speed * min(max(2.0 - behind / LAG, 0.0), 1.0))
     ahead, _ = advance(p_WP, segment, along, max(previous * LOOKAHEAD_TIME, MIN_LOOKAHEAD))
     way = ahead - reference[:3]
-    heading = reference[3]
-    if not backwards and math.hypot(way[0], way[1]) > max(0.3 * abs(way[2]), 0.05):
+    if gap < 0 and not backwards and math.hypot(way[0], way[1]) > max(0.3 * abs(way[2]), 0.05):
         heading = math.atan2(way[1], way[0])
-        off = abs(math.atan2(math.sin(heading - yaw), math.cos(heading - yaw)))
-        share = (STOP_ANGLE - off) / (STOP_ANGLE - FREE_ANGLE)
+        share = (STOP_ANGLE - _off(heading, yaw)) / (STOP_ANGLE - FREE_ANGLE)
         speed = min(speed, limits.max_speed * min(max(share, 0.0), 1.0))
     slower = limits.max_acceleration * limits.period
     speed = min(max(speed, previous - slower), previous + SHARE * slower)
@@ -205,5 +279,8 @@ def hold(
 def warm_up() -> None:
     """Compiles the kernels, or loads them from numba's cache."""
     limits, reference = FlightLimits(), np.zeros(7)
-    follow(read_only(np.zeros((2, 3))), reference, np.zeros(3), 0.0, np.nan, False, 1.0, limits)
+    narrow = read_only(np.zeros(2, np.bool_))
+    follow(
+        read_only(np.zeros((2, 3))), narrow, reference, np.zeros(3), 0.0, np.nan, False, 1.0, limits
+    )
     hold(reference, 0.0, 1.0, limits)

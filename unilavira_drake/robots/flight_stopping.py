@@ -92,11 +92,13 @@ def free_flight(
     direction: NDArray[np.float64],
     horizon: float,
     radius: float,
+    beside: float,
 ) -> float:
     """Returns how far a ball may fly straight before it meets an occupied voxel, metres.
 
-    What lies behind is no hindrance, nor is what the ball already touches and leaves.  Unknown
-    voxels count as free: the planner keeps to what was seen.
+    What lies beside its way farther than ``beside`` does not count: what is in the ball reaches no
+    farther.  What lies behind is no hindrance, nor is what the ball already touches and leaves.
+    Unknown voxels count as free: the planner keeps to what was seen.
 
     Args:
         log_odds: int8 of some voxels; positive is occupied.
@@ -107,9 +109,15 @@ def free_flight(
         direction: (3,) unit vector.
         horizon: metres; returned when nothing is met within it.
         radius: of the ball, metres.
+        beside: horizontally, metres.
     """
     best = horizon
     nx, ny, nz = log_odds.shape
+    level = math.hypot(direction[0], direction[1])
+    c, s = 1.0, 0.0
+    if level > 1e-9:
+        c, s = direction[0] / level, direction[1] / level
+    beside += 0.5 * resolution * (abs(c) + abs(s))
     for x in range(max(bounds[0] - corner[0], 0), min(bounds[3] - corner[0], nx)):
         for y in range(max(bounds[1] - corner[1], 0), min(bounds[4] - corner[1], ny)):
             for z in range(max(bounds[2] - corner[2], 0), min(bounds[5] - corner[2], nz)):
@@ -120,6 +128,8 @@ def free_flight(
                     (corner[1] + y + 0.5) * resolution - p[1],
                     (corner[2] + z + 0.5) * resolution - p[2],
                 )
+                if abs(c * q[1] - s * q[0]) >= beside:
+                    continue
                 best = way_to_voxel(q, 0.5 * resolution, direction, best, radius)
     return best
 
@@ -185,7 +195,7 @@ def warm_up() -> None:
     three, seven = np.zeros(3), np.zeros(7)
     window = frozen_view(np.zeros((1, 1, 1)), np.int8)
     bounds = voxels_ahead(three, three, 1.0, 1.0, 1.0)
-    free_flight(window, (0, 0, 0), bounds, 1.0, three, three, 1.0, 0.3)
+    free_flight(window, (0, 0, 0), bounds, 1.0, three, three, 1.0, 0.3, 0.3)
     braked(three, 1.0, 0.1)
     wished(seven, seven, np.zeros((2, 3)), FlightLimits())
     next_yaw(0.0, 0.0, FlightLimits())
