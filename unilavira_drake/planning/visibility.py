@@ -227,7 +227,7 @@ def route(
     words = window.words
     for size in SIZES:
         # Before anything costly: is there a way at all?
-        if size == SIZES[-1] and reachable(window, start).is_blocked(goal):
+        if size == SIZES[1] and reachable(window, start).is_blocked(goal):
             break
         outcome, nodes = any_angle_path(words, start, goal, slopes, size)
         if outcome != TOO_LARGE:

@@ -137,7 +137,8 @@ def _interval(
     is in counts to the side of its centre.
     """
     c, s = direction[0], direction[1]
-    half = 0.5 * (abs(c) + abs(s))
+    # As a disc: of a wall that is at an angle the corners of its voxels stick out.
+    half = 0.5
     right, left = -most, most
     for k in range(len(columns)):
         x, y = columns[k, 0] + 0.5 - p[0], columns[k, 1] + 0.5 - p[1]

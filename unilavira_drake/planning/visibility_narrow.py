@@ -51,7 +51,7 @@ def narrow_clearance(clearance: Clearance, narrow_radius: float, resolution: flo
 
     Bits keep up to a voxel more than they are asked for; what is too narrow is found out later.
     """
-    return dc.replace(clearance, radius=max(narrow_radius - resolution, 0.0))
+    return dc.replace(clearance, radius=max(narrow_radius - 1.5 * resolution, 0.0))
 
 
 def make_plan(
