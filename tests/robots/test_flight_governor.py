@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.common.value import AbstractValue, Value
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from unilavira_drake.messages import VoxelMap
 from unilavira_drake.messages.voxels import TILE
@@ -40,11 +40,11 @@ def wall(x, half=12):
 class Bench:
     """A governor with fixed inputs, and an aircraft that is where the setpoint is."""
 
-    def __init__(self, voxels=(), *, start=(0.0, 0.0, 1.0), fence=NO_FENCE, follows=True):
+    def __init__(self, voxels=(), *, start=(0.0, 0.0, 1.0), yaw=0.0, fence=NO_FENCE, follows=True):
         self.governor = FlightGovernor(limits=LIMITS, size=SIZE, fence=fence)
         self.context = self.governor.CreateDefaultContext()
         self.voxels, self.time, self.follows = list(voxels), 0.0, follows
-        self.pose = np.array(start)
+        self.pose, self.yaw = np.array(start), yaw
         self.setpoint = np.full(7, np.nan)
         self.fix("twist", np.zeros(6))
         self.fix_map(0.0)
@@ -62,7 +62,8 @@ class Bench:
             self.fix_map(self.time)
         command = np.array([*desired, self.time if issued is None else issued], float)
         self.fix("desired_command", command)
-        self.fix("pose_estimate", Value[RigidTransform](RigidTransform(self.pose)))
+        X_WB = RigidTransform(RollPitchYaw(0.0, 0.0, self.yaw), self.pose)
+        self.fix("pose_estimate", Value[RigidTransform](X_WB))
         discrete = self.governor.EvalUniquePeriodicDiscreteUpdate(self.context)
         self.context.SetDiscreteState(discrete)
         self.setpoint = np.array(discrete.value())
