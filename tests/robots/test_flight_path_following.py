@@ -9,7 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from unilavira_drake.robots.flight_limits import FlightLimits
-from unilavira_drake.robots.flight_path_following import CORNER, corner_speed, follow, hold
+from unilavira_drake.robots.flight_path_following import (
+    CORNER,
+    GATE,
+    NARROW_SPEED,
+    NOSE_IN_LINE,
+    corner_speed,
+    follow,
+    hold,
+)
 
 LIMITS = FlightLimits()
 POINT = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.5, 4))
@@ -127,3 +135,50 @@ def test_backwards_is_the_same_way_at_once_with_the_nose_where_it_was():
     np.testing.assert_allclose(back[-1, :3], path[-1], atol=0.02)
     assert distance_to(path, back[:, :3]).max() < 1e-6
     assert len(back) < len(flown(path, yaw=0.3))
+
+
+GAP = [(0.0, -2.0, 1.0), (2.0, 0.0, 1.0), (3.0, 0.0, 1.0), (3.0, 3.0, 1.0)]
+"""Its second segment is a gap."""
+
+
+def test_in_a_gap_it_is_slow_and_its_nose_along_the_way():
+    rows = flown(GAP, narrow=[1])
+    inside = (rows[:, 0] > 2.0 + GATE) & (rows[:, 0] < 3.0) & (np.abs(rows[:, 1]) < 1e-9)
+    assert inside.sum() > 50
+    speed = np.linalg.norm(rows[:, 4:], axis=1)
+    assert speed[inside].max() <= NARROW_SPEED + 1e-9
+    assert np.abs(rows[inside, 3]).max() <= NOSE_IN_LINE
+    assert speed[~inside].max() > 0.6
+    np.testing.assert_allclose(rows[-1, :3], GAP[-1], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("off", "yaw", "passes"), [((0, 0), 0.0, True), ((0, 0.1), 0.0, False), ((0, 0), 0.3, False)]
+)
+def test_before_a_gap_it_waits_until_the_aircraft_is_in_line(off, yaw, passes):
+    path, narrow = np.array(GAP), np.array([False, True, False, False])
+    reference, travelled = np.array([*GAP[0], 0.8, 0.0, 0.0, 0.0]), math.nan
+    for _ in range(300):
+        p_WB = reference[:3] + np.array([*off, 0.0])
+        *moved, travelled = follow(
+            path, narrow, reference, p_WB, yaw, travelled, False, 4.0, LIMITS
+        )
+        reference = np.array(moved)
+    if passes:
+        assert reference[0] > 2.9
+    else:
+        assert np.linalg.norm(reference[:3] - GAP[1]) < GATE
+        assert reference[3] == pytest.approx(0.0, abs=0.02)
+
+
+def test_its_nose_stays_along_a_gap_until_the_aircraft_is_out_of_it():
+    path, narrow = np.array(GAP), np.array([False, True, False, False])
+    reference, travelled = np.array([2.9, 0.0, 1.0, 0.0, 0.3, 0.0, 0.0]), math.nan
+    behind = np.array([2.7, 0.0, 1.0])
+    for _ in range(40):
+        *moved, travelled = follow(
+            path, narrow, reference, behind, 0.0, travelled, False, 4.0, LIMITS
+        )
+        reference = np.array(moved)
+    assert reference[1] > 0.1
+    assert reference[3] == 0.0

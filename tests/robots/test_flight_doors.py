@@ -1,0 +1,55 @@
+"""A few of the flights of the quadrotor's benchmark, through doors in which it cannot turn."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from unilavira_drake.robots.flight_config import FlightConfig
+from unilavira_drake.robots.quadrotor import Quadrotor
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+FINE = FlightConfig(resolution=0.05)
+
+
+@pytest.fixture(scope="module")
+def flights() -> Any:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(BENCHMARKS))
+        spec = importlib.util.spec_from_file_location("door_flights", BENCHMARKS / "flights.py")
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[spec.name] = module
+        spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("seed", [0, 3, 8])
+def test_it_flies_through_a_door_little_wider_than_itself(flights: Any, seed: int) -> None:
+    flight = flights.seeded_flight(Quadrotor(), seed, ratio=1.35, config=FINE)
+    assert (flight.state, flight.reason, flight.through) == ("arrived", "", True)
+    assert flight.off_goal < 0.3
+    assert flight.contact == 0.0
+    assert flight.clearance > 0.01
+
+
+def test_on_the_map_of_rooms_too_where_their_voxels_leave_it_the_room(flights: Any) -> None:
+    ends = (-2.0, 1.0, 1.0), (2.0, -1.0, 1.5)
+    flight = flights.fly(
+        Quadrotor(), FlightConfig(), start=ends[0], goal=ends[1], door=0.05, width=0.6, seed=1
+    )
+    assert (flight.state, flight.reason, flight.contact) == ("arrived", "", 0.0)
+    assert flight.off_goal < 0.3
+
+
+def test_a_door_that_is_too_narrow_is_told(flights: Any) -> None:
+    flight = flights.fly(
+        Quadrotor(), FINE, start=(-2.0, 0.0, 0.0), goal=(2.5, 0.0, 1.0), door=0.0, width=0.4, seed=1
+    )
+    assert (flight.state, flight.reason) == ("failed", "unreachable")
+    assert (flight.through, flight.contact) == (False, 0.0)
