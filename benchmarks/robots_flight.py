@@ -13,9 +13,10 @@ agent (the ``fixed`` model, without latency), navigation and monitor.  Only the 
 * ``B3``: seeded flights from one half of a hall to the other through a door, on a known map, with
   planner, controller, governor, autopilot, physics and gusts; walls entered, and flights that did
   not arrive.  The target is for doors 1.35 times as wide as the aircraft with its propellers,
-  0.51 m.  That is less than what the planner keeps free, a radius of 0.30 m, and than the circle
-  around the body, 0.54 m, of the governor: such a door is refused.  With voxels of 0.05 m the
-  planner passes every door of 0.65 m, 1.71 times as wide, so that wider ones are flown, too.
+  0.51 m.  That is less than the circle around the body, 0.54 m: it flies through such a door
+  straight, with its nose along the way, and turns before and behind it.  With voxels of 0.05 m
+  every door of 0.65 m, 1.71 times as wide, leaves the planner the radius of 0.30 m in which the
+  aircraft may turn, so that wider ones are flown, too.
 """
 
 from __future__ import annotations

@@ -148,6 +148,12 @@ def test_where_one_gap_is_too_narrow_another_one_is_taken():
     assert abs(plan.p_WP[plan.narrow[0]][1] + 1.6) < 0.03
 
 
+def test_coarse_voxels_show_no_gaps():
+    """Two voxels wide, of which nobody knows where in them its sides are."""
+    space = space_of(rooms(0.0, [(0.125, 0.25, 0.5)], 0.25))
+    assert planned(space, (-1.2, 0.25, 1.0), (1.4, 0.25, 1.0)).reason == "unreachable"
+
+
 def test_who_flies_through_no_gaps_ends_where_it_gets():
     space = space_of(rooms(0.0, [(0.0, 0.0, 0.513)]))
     usual = FlightParameters(

@@ -59,6 +59,8 @@ def make_plan(
 ) -> tuple[FlightPlan, FlightSpace]:
     """Returns a plan with room to turn, or one through gaps where there is no other.
 
+    Voxels larger than the narrow radius show no gaps: too little is known of where their sides are.
+
     Args:
         space: where the aircraft may fly and turn.
         tight: where the latest search for gaps took place; the new one is returned.
@@ -74,10 +76,9 @@ def make_plan(
         goal=goal,
         parameters=parameters,
     )
-    wanted = plan.reason == UNREACHABLE or plan.elsewhere
-    if parameters.narrow_radius is None or not wanted:
+    wanted, resolution = plan.reason == UNREACHABLE or plan.elsewhere, space.voxels.resolution
+    if parameters.narrow_radius is None or parameters.narrow_radius < resolution or not wanted:
         return plan, tight
-    resolution = space.voxels.resolution
     clearance = narrow_clearance(space.clearance, parameters.narrow_radius, resolution)
     if tight.clearance != clearance:
         tight = FlightSpace(clearance=clearance)
