@@ -28,8 +28,9 @@ DIRECTIONS = 180
 REACH = 2.0
 """Room to turn is looked for up to this far from a point in a gap, metres."""
 
-RUN = 0.2
-"""A line is longer by this than the gap where there is room, so that it is met straight, metres."""
+RUN_IN, RUN_OUT = 0.35, 0.2
+"""Where there is room a line begins so long before a gap and ends so far behind it, metres: there
+it is met straight, and who comes from the side is not yet too near to what is beside the gap."""
 
 
 def best_line(
@@ -49,12 +50,12 @@ def best_line(
         beyond: the same one, all blocked but where it wants to go.
     """
     resolution = space.voxels.resolution
-    reach = REACH / resolution
+    reach, runs = REACH / resolution, (RUN_IN / resolution, RUN_OUT / resolution)
     line, best = np.zeros((2, 3)), np.zeros(2)
     for place in places:
         low, high = np.floor(place - reach), np.floor(place + reach) + 1.0
         columns = _columns_between(space, before.low, low, high, (place[2], place[2]))
-        _improve(place, columns, before.words, beyond.words, reach, RUN / resolution, line, best)
+        _improve(place, columns, before.words, beyond.words, reach, runs, line, best)
     return line, float(best[0]) * resolution
 
 
@@ -189,7 +190,7 @@ def _improve(
     before: NDArray[np.uint32],
     beyond: NDArray[np.uint32],
     reach: float,
-    run: float,
+    runs: tuple[float, float],
     line: NDArray[np.float64],
     best: NDArray[np.float64],
 ) -> None:
@@ -205,8 +206,8 @@ def _improve(
         behind = ahead = free = 0.0
         # To the middle, and once more, for it begins and ends elsewhere then.
         for _ in range(3):
-            behind = _room(before, p, -c, -s, reach, run)
-            ahead = _room(beyond, p, c, s, reach, run) if behind >= 0.0 else -1.0
+            behind = _room(before, p, -c, -s, reach, runs[0])
+            ahead = _room(beyond, p, c, s, reach, runs[1]) if behind >= 0.0 else -1.0
             if ahead < 0.0:
                 break
             right, left = _interval(p, direction, columns, behind, ahead, reach)
@@ -233,4 +234,4 @@ def warm_up() -> None:
     words = np.zeros((4, 4, 1), np.uint32)
     place = np.array([1.5, 1.5, 1.5])
     columns = _columns(words, 0, 1)
-    _improve(place, columns, words, words, 1.0, 0.5, np.zeros((2, 3)), np.zeros(2))
+    _improve(place, columns, words, words, 1.0, (0.5, 0.5), np.zeros((2, 3)), np.zeros(2))
