@@ -283,6 +283,7 @@ def test_a_window_too_large_to_search_says_so():
         {"descend_angle": 3.0},
         {"snap_distance": -1.0},
         {"max_altitude": math.inf},
+        {"narrow_radius": 0.0},
     ],
 )
 def test_limits_that_make_no_sense_are_refused(named):

@@ -86,6 +86,8 @@ class FlightParameters(Message):
                 raise ValueError("angles of climb and descent must lie in (0.01, pi / 2] radians")
         if not (0.0 <= self.snap_distance < math.inf and 0.0 < self.max_distance < math.inf):
             raise ValueError("distances must be finite and not negative")
+        if self.narrow_radius is not None and not 0.0 < self.narrow_radius < math.inf:
+            raise ValueError("the narrow radius must be finite and positive")
 
     @property
     def slopes(self) -> Slopes:

@@ -184,6 +184,38 @@ def _room(
 
 
 @kernel
+def _centred(
+    p: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    columns: Columns,
+    before: NDArray[np.uint32],
+    beyond: NDArray[np.uint32],
+    reach: float,
+    runs: tuple[float, float],
+) -> tuple[float, float, float]:
+    """Moves p across a direction to the middle of what is free.
+
+    Returns how far from it room to turn is behind and ahead (-1: there is none), and what is free
+    beside the line between.
+    """
+    c, s = direction[0], direction[1]
+    free = 0.0
+    # It begins and ends elsewhere once it is in the middle.
+    for shifts in range(4):
+        behind = _room(before, p, -c, -s, reach, runs[0])
+        ahead = _room(beyond, p, c, s, reach, runs[1]) if behind >= 0.0 else -1.0
+        if ahead < 0.0:
+            return 0.0, -1.0, 0.0
+        right, left = _interval(p, direction, columns, behind, ahead, reach)
+        shift, free = 0.5 * (left + right), min(left, -right)
+        if shifts == 3 or left <= right or abs(shift) < 1e-9:
+            break
+        p[0] -= shift * s
+        p[1] += shift * c
+    return behind, ahead, free
+
+
+@kernel
 def _improve(
     place: NDArray[np.float64],
     columns: Columns,
@@ -203,26 +235,10 @@ def _improve(
         direction = np.array([math.cos(angle), math.sin(angle)])
         c, s = direction[0], direction[1]
         p = place.copy()
-        behind = ahead = free = 0.0
-        # To the middle, and once more, for it begins and ends elsewhere then.
-        for _ in range(3):
-            behind = _room(before, p, -c, -s, reach, runs[0])
-            ahead = _room(beyond, p, c, s, reach, runs[1]) if behind >= 0.0 else -1.0
-            if ahead < 0.0:
-                break
-            right, left = _interval(p, direction, columns, behind, ahead, reach)
-            free = 0.5 * (left - right)
-            shift = 0.5 * (left + right)
-            if free <= 0.0 or abs(shift) < 1e-9:
-                break
-            p[0] -= shift * s
-            p[1] += shift * c
-        if ahead < 0.0:
-            continue
-        right, left = _interval(p, direction, columns, behind, ahead, reach)
-        free = min(left, -right)
+        behind, ahead, free = _centred(p, direction, columns, before, beyond, reach, runs)
         length = behind + ahead
-        if free < best[0] - 1e-6 or (free < best[0] + 1e-6 and -length <= best[1] + 1e-6):
+        as_wide = free < best[0] + 1e-6
+        if ahead < 0.0 or free < best[0] - 1e-6 or (as_wide and -length <= best[1] + 1e-6):
             continue
         best[0], best[1] = free, -length
         line[0, 0], line[0, 1], line[0, 2] = p[0] - behind * c, p[1] - behind * s, p[2]

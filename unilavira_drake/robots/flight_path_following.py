@@ -198,6 +198,12 @@ def turned(yaw: float, heading: float, max_yaw_acceleration: float, limits: Flig
 
 
 @kernel
+def _heading(way: NDArray[np.float64]) -> float:
+    """Returns where a way leads, radians."""
+    return math.atan2(way[1], way[0])
+
+
+@kernel
 def _off(heading: float, yaw: float) -> float:
     """Returns the angle between two headings, radians."""
     return abs(math.atan2(math.sin(heading - yaw), math.cos(heading - yaw)))
@@ -234,18 +240,16 @@ def follow(
     segment, along = locate(p_WP, travelled)
     previous = math.sqrt(np.sum(reference[4:7] ** 2))
     gap = gap_at(p_WP, narrow, segment, along, p_WB)
-    heading, in_line = reference[3], False
-    if gap >= 0:
-        step = p_WP[gap + 1] - p_WP[gap]
-        heading = math.atan2(step[1], step[0])
-        in_line = off_line(p_WP, gap, p_WB) < IN_LINE and _off(heading, yaw) < NOSE_IN_LINE
+    heading = reference[3] if gap < 0 else _heading(p_WP[gap + 1] - p_WP[gap])
+    in_line = gap >= 0 and _off(heading, yaw) < NOSE_IN_LINE
+    in_line = in_line and off_line(p_WP, gap, p_WB) < IN_LINE
     speed = _speed_ahead(p_WP, narrow, segment, along, in_line, acceleration, limits)
     behind = math.sqrt(np.sum((reference[:3] - p_WB) ** 2))
     speed = min(speed, limits.max_speed * min(max(2.0 - behind / LAG, 0.0), 1.0))
     ahead, _ = advance(p_WP, segment, along, max(previous * LOOKAHEAD_TIME, MIN_LOOKAHEAD))
     way = ahead - reference[:3]
     if gap < 0 and not backwards and math.hypot(way[0], way[1]) > max(0.3 * abs(way[2]), 0.05):
-        heading = math.atan2(way[1], way[0])
+        heading = _heading(way)
         share = (STOP_ANGLE - _off(heading, yaw)) / (STOP_ANGLE - FREE_ANGLE)
         speed = min(speed, limits.max_speed * min(max(share, 0.0), 1.0))
     slower = limits.max_acceleration * limits.period
