@@ -145,9 +145,9 @@ class EpisodeMonitor(Level):
         )
 
     def _follow_motion(self, context: Context, state: MonitorState, time: float) -> MonitorState:
-        X_WB = self._pose(context).GetAsMatrix34()
-        x, y, z = (float(value) for value in X_WB[:, 3])
-        yaw = math.atan2(X_WB[1, 0], X_WB[0, 0])
+        X_WB: list[float] = self._pose(context).GetAsMatrix34().ravel().tolist()
+        x, y, z = X_WB[3::4]
+        yaw = math.atan2(X_WB[4], X_WB[0])
         metrics = state.metrics
         step = metrics.distance_from(x, y, z) if state.started else 0.0
         least_turn = LEAST_YAW if self._flies else SMALLEST_TURN

@@ -87,8 +87,8 @@ class OccupancyMap(Message):
     def cell(self, x: float, y: float) -> Key:
         """Returns (row, column) of a world point; it may lie outside the grid."""
         return (
-            int(np.floor((y - self.origin[1]) / self.resolution)),
-            int(np.floor((x - self.origin[0]) / self.resolution)),
+            math.floor((y - self.origin[1]) / self.resolution),
+            math.floor((x - self.origin[0]) / self.resolution),
         )
 
     def center(self, row: int, column: int) -> tuple[float, float]:

@@ -81,9 +81,9 @@ class GroundTrackingController(LeafSystem):
         sweep = self._sweep(context)
         follow = len(path.p_WP) > 0 and path.n >= sweep.n
         if follow or sweep.active:
-            X_WB = self._pose(context).GetAsMatrix34()
-            x, y, yaw = X_WB[0, 3], X_WB[1, 3], math.atan2(X_WB[1, 0], X_WB[0, 0])
-            yaw_rate = self._twist(context)[2]
+            X_WB: list[float] = self._pose(context).GetAsMatrix34().ravel().tolist()
+            x, y, yaw = X_WB[3], X_WB[7], math.atan2(X_WB[4], X_WB[0])
+            yaw_rate = float(self._twist(context)[2])
         if follow and path.backwards:
             left = math.hypot(path.p_WP[-1, 0] - x, path.p_WP[-1, 1] - y)
             speed, rate = back_off(left, speed, rate, limits)
