@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.multibody.tree import ModelInstanceIndex, PrismaticJoint, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
@@ -97,8 +97,15 @@ def has_servos(plant: MultibodyPlant, instance: ModelInstanceIndex) -> list[bool
         ('p="0" d="20000"', 'p="5" d="20000"'),
         ("<xyz>0 1 0</xyz>", "<xyz>0 0.6 0.8</xyz>"),
         ('<drake:controller_gains p="0" d="2000"/>', ""),
+        ("<limit><effort>100", "<dynamics><damping>5</damping></dynamics><limit><effort>100"),
     ],
-    ids=["the mass turns about another axis", "held in place", "carries weight", "no servo"],
+    ids=[
+        "the mass turns about another axis",
+        "held in place",
+        "carries weight",
+        "no servo",
+        "damped",
+    ],
 )
 def test_servos_that_no_closed_form_stands_for_stay_drakes(old: str, new: str) -> None:
     plant, instance = cobot(DiagramBuilder(), old, new)
@@ -113,4 +120,60 @@ def test_legs_keep_drakes_servos(name: str) -> None:
     plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), TIME_STEP)
     instance = add_robot_model(plant, robot_kinds()[name]())
     plant.Finalize()
+    assert take_servos(plant, instance) is None
+
+
+ARM = """
+<sdf version="1.9" xmlns:drake="drake.mit.edu"><model name="arm">
+  <link name="hub"/><link name="slider"><inertial><mass>20</mass></inertial></link>
+  <joint name="yaw" type="continuous"><parent>world</parent><child>hub</child>
+    <axis><xyz>0 0 1</xyz><limit><effort>100</effort></limit></axis>
+    <drake:controller_gains p="0" d="2000"/></joint>
+  <joint name="reach" type="prismatic"><parent>hub</parent><child>slider</child>
+    <axis><xyz>1 0 0</xyz><limit><effort>100</effort></limit></axis>
+    <drake:controller_gains p="0" d="2000"/></joint>
+</model></sdf>
+"""
+
+
+def test_an_inertia_that_changes_with_the_joints_is_seen() -> None:
+    plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), TIME_STEP)
+    [instance] = Parser(plant).AddModelsFromString(ARM, "sdf")
+    plant.Finalize()
+    assert take_servos(plant, instance) is None
+
+
+def test_what_another_model_hangs_on_a_base_is_seen() -> None:
+    plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), TIME_STEP)
+    [instance] = Parser(plant).AddModelsFromString(COBOT.read_text(), "sdf")
+    mass = SpatialInertia.SolidBoxWithMass(5.0, 0.2, 0.2, 0.2)
+    body = plant.AddRigidBody("load", plant.AddModelInstance("load"), mass)
+    axis: Any = np.array([1.0, 0.0, 0.0])
+    base = plant.GetBodyByName("base", instance)
+    plant.AddJoint(PrismaticJoint("slide", base.body_frame(), body.body_frame(), axis))
+    plant.Finalize()
+    assert take_servos(plant, instance) is None
+
+
+def test_a_model_beside_the_base_does_not_matter() -> None:
+    plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), TIME_STEP)
+    parser = Parser(plant)
+    [instance] = parser.AddModelsFromString(COBOT.read_text(), "sdf")
+    parser.AddModelsFromString(ARM, "sdf")
+    plant.Finalize()
+    assert take_servos(plant, instance) is not None
+
+
+def test_a_plant_with_constraints_keeps_drakes_servos() -> None:
+    plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), TIME_STEP)
+    [instance] = Parser(plant).AddModelsFromString(COBOT.read_text(), "sdf")
+    joints = [plant.GetJointByName(name, instance) for name in ("base_x", "base_y")]
+    plant.AddCouplerConstraint(*joints, 2.0)
+    plant.Finalize()
+    assert take_servos(plant, instance) is None
+
+
+def test_servos_are_taken_once() -> None:
+    plant, instance = cobot(DiagramBuilder())
+    assert take_servos(plant, instance) is not None
     assert take_servos(plant, instance) is None

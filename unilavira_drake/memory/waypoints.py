@@ -225,7 +225,7 @@ def _told(panorama: Panorama, target: str) -> str:
     if outcome.remaining is None:
         return f"{outcome.words}, too far to measure"
     told = f"{outcome.words}, {outcome.remaining:.1f} m from it"
-    if outcome.height is None:
+    if outcome.height is None or abs(outcome.height) < 0.05:
         return told
     side = "higher" if outcome.height > 0 else "lower"
     return f"{told} (it is {abs(outcome.height):.1f} m {side})"

@@ -202,8 +202,8 @@ class Sheet:
     def _stairs(self, part: EpisodeTrace, until: float) -> tuple[tuple[float, float], ...]:
         """Returns where the way changes between the floor of a part and others."""
         times = part.points[:, 0]
-        changes = (t for span in part.away for t in span if times[0] < t < min(until, times[-1]))
-        places = (stretch(part.points, t, t)[0, 1:] for t in changes)
+        ends = {t for span in part.away for t in span if times[0] < t < min(until, times[-1])}
+        places = (stretch(part.points, t, t)[0, 1:] for t in sorted(ends))
         return tuple(self._point(x, y) for x, y in places)
 
     def _part(self, name: str) -> EpisodeTrace:

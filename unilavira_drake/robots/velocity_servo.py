@@ -12,8 +12,13 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from unilavira_drake.ports import vector_input
 
-SAMPLE = 0.7
-"""Each joint is looked at in this place, m or rad: at zero, coupled joints may look free."""
+SAMPLES = (0.7, -1.9)
+"""Places of the joints in which their inertia is compared, m or rad: at zero, coupled ones may look
+free, and in one place alone an inertia that changes looks constant."""
+
+
+SMALL = 1e-9
+"""What is less by this share is rounding."""
 
 
 class ServoGains(NamedTuple):
@@ -29,8 +34,8 @@ def take_servos(plant: MultibodyPlant, model_instance: ModelInstanceIndex) -> Se
     """Takes the velocity servos of a model out of its plant, if a closed form can stand for them.
 
     In a discrete plant a servo d (v_d - v) acts on the speed v+ at the end of the step; Drake finds
-    it as a constraint, by the solver that it has for contacts.  For a joint of inertia m that
-    nothing couples with others, v+ = v + dt u / m gives the same force directly:
+    it as a constraint, by the solver that it has for contacts.  For a joint of constant inertia m
+    that nothing couples with others, v+ = v + dt u / m gives the same force directly:
 
         u = d (v_d - v+) = d / (1 + dt d / m) (v_d - v), within the effort.
 
@@ -42,32 +47,26 @@ def take_servos(plant: MultibodyPlant, model_instance: ModelInstanceIndex) -> Se
         model_instance: of the robot.
 
     Returns:
-        The gains, in the order of the actuators, which are servos no more; None, and nothing is
-        changed, for a model with joints that are coupled, not actuated, held in place, or in
-        another order than their actuators.
+        The gains, in the order of the actuators, which are servos no more.  None, and nothing is
+        changed, for a model with joints that are not actuated, held in place, damped, or in another
+        order than their actuators; with an inertia that is not constant, or coupled among its
+        joints or with another model's; with weight on a joint; and in a plant with constraints.
     """
     actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices(model_instance)]
     joints = [actuator.joint() for actuator in actuators]
     if len(joints) != plant.num_velocities(model_instance) or any(
-        joint.num_velocities() != 1 for joint in joints
+        joint.num_velocities() != 1 or np.any(joint.default_damping_vector()) for joint in joints
     ):
         return None
     # Asked in this order: Drake aborts when it is asked for gains that are not there.
     if not all(actuator.has_controller() for actuator in actuators):
         return None
     gains = [actuator.get_controller_gains() for actuator in actuators]
-    if any(gain.p != 0.0 for gain in gains):
-        return None
-    context = plant.CreateDefaultContext()
-    place: Any = np.full(len(joints), SAMPLE)
-    plant.SetPositions(context, model_instance, place)
     index = [joint.velocity_start() for joint in joints]
-    if index != sorted(index):
+    if any(gain.p != 0.0 for gain in gains) or index != sorted(index) or plant.num_constraints():
         return None
-    inertia = plant.CalcMassMatrix(context)[np.ix_(index, index)]
-    weight = plant.CalcGravityGeneralizedForces(context)[index]
-    m: NDArray[np.float64] = np.diag(inertia).copy()
-    if np.abs(inertia - np.diag(m)).max() > 1e-9 * m.max() or np.any(weight):
+    m = _constant_inertia(plant, model_instance, index)
+    if m is None:
         return None
     for actuator in actuators:
         plant.get_mutable_joint_actuator(actuator.index()).set_controller_gains(
@@ -76,6 +75,26 @@ def take_servos(plant: MultibodyPlant, model_instance: ModelInstanceIndex) -> Se
     d = np.array([gain.d for gain in gains])
     effort = np.array([actuator.effort_limit() for actuator in actuators])
     return ServoGains(d / (1.0 + plant.time_step() * d / m), effort)
+
+
+def _constant_inertia(
+    plant: MultibodyPlant, model_instance: ModelInstanceIndex, index: list[int]
+) -> NDArray[np.float64] | None:
+    """The inertia of each joint, kg or kg m^2; None if that is not all that resists it."""
+    context = plant.CreateDefaultContext()
+    found: list[NDArray[np.float64]] = []
+    for sample in SAMPLES:
+        place: Any = np.full(len(index), sample)
+        plant.SetPositions(context, model_instance, place)
+        rows: NDArray[np.float64] = plant.CalcMassMatrix(context)[index]
+        m = rows[range(len(index)), index].copy()
+        rows[range(len(index)), index] = 0.0
+        weight: NDArray[np.float64] = plant.CalcGravityGeneralizedForces(context)[index]
+        if np.abs(rows).max() > SMALL * m.max() or np.abs(weight).max() > SMALL * m.max():
+            return None
+        found.append(m)
+    same = np.allclose(found[0], found[1], rtol=SMALL, atol=0.0)
+    return found[0] if same else None
 
 
 class VelocityServo(LeafSystem):

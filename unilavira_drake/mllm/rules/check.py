@@ -22,7 +22,7 @@ def double_check(situation: Situation) -> dict[str, Any]:
     listed = situation.variables.todo is not None
     open_steps = situation.pending if listed else review(situation).pending
     if why := out_of_reach(situation, aim_of(review(situation).steps, situation.scene.room).goal):
-        return {"reasoning": why, "confirmed": True, "reason": why}
+        return {"reasoning": why, "confirmed": True, "reason": f"Not done, given up: {why}"}
     if open_steps:
         reason = f"not done: {describe(open_steps[0].clause)}"
         return {"reasoning": reason, "confirmed": False, "reason": reason}

@@ -55,7 +55,7 @@ def decide(situation: Situation) -> dict[str, Any]:
     ]
     aim = aim_of(progress.steps, situation.scene.room)
     if why := out_of_reach(situation, aim.goal):
-        reply["reasoning_action"] = f"{why} Nothing is left to do here: check and stop."
+        reply["reasoning_action"] = f"{why} Give up: check and stop."
         return _without_list(reply, situation)
     flight = stairs_to_take(situation, aim.goal)
     if flight is not None:

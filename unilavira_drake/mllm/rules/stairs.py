@@ -50,9 +50,10 @@ def stairs_to_take(situation: Situation, goal: Clause | None) -> StairChoice | N
 
 
 def out_of_reach(situation: Situation, goal: Clause | None) -> str:
-    """Returns why nothing is left to do for a robot that is told it takes no stairs, or nothing.
+    """Returns why a robot that is told it takes no stairs gives up, or nothing.
 
-    The next step takes stairs; or its goal is not in view and the search finds no new room.
+    The next step takes stairs; or its goal is not in view, and the latest places that it
+    remembers are in kinds of rooms that it knew before.  A room that was not entered may be left.
     """
     if not situation.variables.stairs_barred or goal is None:
         return ""
@@ -62,11 +63,14 @@ def out_of_reach(situation: Situation, goal: Clause | None) -> str:
     if not searches or situation.scene.matching(goal) or not _nothing_new(situation):
         return ""
     what = goal.thing or goal.room
-    return f"No {what} is in the rooms of this floor, and this robot cannot take stairs."
+    return (
+        f"No {what} was seen so far, the latest places brought no new kind of room, "
+        "and this robot cannot take stairs."
+    )
 
 
 def _nothing_new(situation: Situation) -> bool:
-    """Whether the latest places lie in rooms of kinds that were entered before."""
+    """Whether the newest of the places that are remembered lie in kinds of rooms known before."""
     rooms = [place.room for place in situation.visited if place.room]
     return len(rooms) > _LULL and set(rooms[-_LULL:]) <= set(rooms[:-_LULL])
 
