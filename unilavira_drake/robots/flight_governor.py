@@ -149,7 +149,7 @@ class FlightGovernor(LeafSystem):
             if distance > leash:
                 setpoint[:3] = p_WB + behind * (min(leash, LEASH) / distance)
         followed = valid and not lost
-        # The setpoint's aircraft is as wide as the true one if that is turned farther.
+        # The setpoint's aircraft is as wide as any between it and the true one, which comes after.
         yaws = (float(setpoint[3]), math.atan2(X_WB[1, 0], X_WB[0, 0]) if seen else math.nan)
         v = self._velocity(context, setpoint, yaws, np.array(desired[:7]) if followed else None)
         setpoint[4:] = v
@@ -198,7 +198,7 @@ class FlightGovernor(LeafSystem):
         if context.get_time() - map_.time > self._map_timeout:
             return slower
         direction = v / speed
-        beside = max(half_width(self._size, yaw, direction) for yaw in yaws if not math.isnan(yaw))
+        beside = width_between(self._size, yaws, direction)
         allowed = self._allowed_speed(map_, setpoint[:3], direction, speed, beside + BESIDE)
         if allowed >= speed:
             return v
@@ -239,6 +239,30 @@ class FlightGovernor(LeafSystem):
             turn_meets(voxels, corner, bounds, map_.resolution, *turn)
             for voxels, corner in _tiles(map_, bounds)
         )
+
+
+def width_between(size: Size, yaws: tuple[float, float], direction: NDArray[np.float64]) -> float:
+    """Returns how far a rectangle reaches beside a way at most while it turns, metres.
+
+    Args:
+        size: of the rectangle, metres.
+        yaws: between which it turns, the short way round, radians; the second may be NaN.
+        direction: (3,) of the way.
+    """
+    first, second = yaws
+    width = half_width(size, first, direction)
+    if math.isnan(second):
+        return width
+    turn = math.atan2(math.sin(second - first), math.cos(second - first))
+    width = max(width, half_width(size, second, direction))
+    # It is widest where a diagonal is across the way.
+    begin = first - math.atan2(direction[1], direction[0])
+    low, high = min(begin, begin + turn), max(begin, begin + turn)
+    diagonal = math.atan2(size[0], size[1])
+    for widest in (diagonal, -diagonal):
+        if widest + math.pi * math.ceil((low - widest) / math.pi) < high:
+            return 0.5 * math.hypot(*size)
+    return width
 
 
 def _tiles(
