@@ -28,8 +28,8 @@ from unilavira_drake.robots.flight_stopping import (
 )
 from unilavira_drake.robots.stopping import stoppable_speed
 
-BESIDE = 0.01
-"""Kept free beside the aircraft, metres."""
+LEAST_BESIDE = 0.01
+"""Without so much free beside the aircraft, metres, the setpoint does not move on."""
 LEASH = 1.5
 """The setpoint is never farther from the aircraft than this, metres."""
 BRAKING_SHARE = 0.8
@@ -54,7 +54,9 @@ class FlightGovernor(LeafSystem):
       as free: no camera looks up, so a climb is checked only against what was mapped before.
       Beside its way so much is free as the aircraft is wide for its yaw: less in a gap through
       which it flies straight than where it turns.
-    * It turns on the spot unless its corners would meet an occupied voxel.
+    * Neither in flight nor on the spot does it turn where its corners would meet an occupied voxel
+      that they do not meet yet.  It keeps its yaw until they would not: it tries only the short
+      way round, even where the long one is free.
 
     The state is the setpoint, NaN until pose and command are known and finite ever after, and when
     the pose last changed.
@@ -199,7 +201,7 @@ class FlightGovernor(LeafSystem):
             return slower
         direction = v / speed
         beside = width_between(self._size, yaws, direction)
-        allowed = self._allowed_speed(map_, setpoint[:3], direction, speed, beside + BESIDE)
+        allowed = self._allowed_speed(map_, setpoint[:3], direction, speed, beside + LEAST_BESIDE)
         if allowed >= speed:
             return v
         v = v * (allowed / speed)
