@@ -23,8 +23,9 @@ MOVING_VIEWS = ("front", "down")
 """The views that are mapped on the way: ahead, where the nose points, and below.  A panorama adds
 them all."""
 
-BESIDE = 0.04
-"""Kept free on either side of an aircraft in a gap that it flies through straight, metres."""
+PLANNED_BESIDE = 0.04
+"""Kept free on either side of an aircraft in a gap that it flies through straight, metres: no less
+than it needs when it is as far off the line, and its nose, as the controller lets it go in."""
 
 
 def make_flight_navigation(
@@ -119,7 +120,7 @@ def _add_mapper_and_planner(
         "planner",
         lambda: VisibilityPlanner(
             radius=robot.radius,
-            narrow_radius=0.5 * robot.width + BESIDE,
+            narrow_radius=0.5 * robot.width + PLANNED_BESIDE,
             ground_margin=flight.ground_margin,
             ceiling_margin=flight.ceiling_margin,
             min_altitude=flight.min_altitude,

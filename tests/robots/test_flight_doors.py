@@ -9,7 +9,10 @@ from typing import Any
 
 import pytest
 
+from unilavira_drake.flight_navigation import PLANNED_BESIDE
 from unilavira_drake.robots.flight_config import FlightConfig
+from unilavira_drake.robots.flight_governor import LEAST_BESIDE
+from unilavira_drake.robots.flight_path_following import IN_LINE, NOSE_IN_LINE
 from unilavira_drake.robots.quadrotor import Quadrotor
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
@@ -27,6 +30,13 @@ def flights() -> Any:
         sys.modules[spec.name] = module
         spec.loader.exec_module(module)
     return module
+
+
+def test_a_planned_gap_has_room_for_what_counts_as_in_line() -> None:
+    """A nose that is off by an angle moves the corners aside by half the length times it."""
+    aside = 0.5 * Quadrotor().length * NOSE_IN_LINE
+    assert IN_LINE + aside <= PLANNED_BESIDE
+    assert PLANNED_BESIDE > LEAST_BESIDE
 
 
 @pytest.mark.parametrize("seed", [0, 3, 8])

@@ -10,6 +10,7 @@ from test_flight_governor import RADIUS, SIZE, STANDOFF, Bench
 
 from unilavira_drake.messages.voxels import TILE
 from unilavira_drake.robots.flight_footprint import half_width, overlaps, turn_meets
+from unilavira_drake.robots.flight_governor import width_between
 
 SIDE = st.floats(0.1, 1.0)
 ANGLE = st.floats(-7.0, 7.0)
@@ -30,6 +31,17 @@ def test_its_width_is_that_of_its_corners_across_the_way(length, width, yaw, way
     direction = np.array([math.cos(way), math.sin(way), rise])
     direction /= np.linalg.norm(direction)
     assert half_width((length, width), yaw, direction) == pytest.approx(expected, abs=1e-9)
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(SIDE, SIDE, ANGLE, st.floats(-3.0, 3.0), ANGLE)
+def test_its_width_on_a_turn_is_the_greatest_on_the_way(length, width, yaw, turn, way):
+    direction = np.array([math.cos(way), math.sin(way), 0.0])
+    size, between = (length, width), yaw + np.linspace(0.0, turn, 2001)
+    expected = max(half_width(size, angle, direction) for angle in between)
+    for after in (yaw + turn, yaw + turn - 2.0 * math.pi):
+        assert width_between(size, (yaw, after), direction) == pytest.approx(expected, abs=1e-5)
+    assert width_between(size, (yaw, math.nan), direction) == half_width(size, yaw, direction)
 
 
 def test_a_climb_needs_room_for_the_corners():
@@ -109,6 +121,15 @@ def test_nor_one_that_is_in_line_as_it_should_be_and_not_as_it_is():
     bench = Bench(gap(), start=(0.0, MIDDLE, 1.0))
     bench.tick([0, MIDDLE, 1, 0, 0, 0, 0])
     bench.yaw = math.radians(30)
+    rows = bench.chase((3.0, MIDDLE, 1.0), ticks=200)
+    assert rows[-1, 0] <= 1.0 - STANDOFF
+
+
+def test_nor_one_that_still_turns_from_askew_to_in_line():
+    """Across the way it is as wide at both yaws as the gap lets through, and wider between."""
+    bench = Bench(gap(), start=(0.0, MIDDLE, 1.0))
+    bench.tick([0, MIDDLE, 1, 0, 0, 0, 0])
+    bench.yaw = math.radians(90)
     rows = bench.chase((3.0, MIDDLE, 1.0), ticks=200)
     assert rows[-1, 0] <= 1.0 - STANDOFF
 

@@ -12,6 +12,7 @@ from unilavira_drake.robots.flight_limits import FlightLimits
 from unilavira_drake.robots.flight_path_following import (
     CORNER,
     GATE,
+    IN_LINE,
     NARROW_SPEED,
     NOSE_IN_LINE,
     corner_speed,
@@ -182,3 +183,34 @@ def test_its_nose_stays_along_a_gap_until_the_aircraft_is_out_of_it():
         reference = np.array(moved)
     assert reference[1] > 0.1
     assert reference[3] == 0.0
+
+
+@pytest.mark.parametrize("leg", [0.0, 0.02, 0.1, 0.2])
+@pytest.mark.parametrize("degrees", [0, 30, -60, 90])
+def test_before_the_next_gap_too_it_waits_for_an_aircraft_that_lags(leg, degrees):
+    """An airlock: two gaps, and between them less than the aircraft is behind."""
+    turn = math.radians(degrees)
+    way = np.array([math.cos(turn), math.sin(turn), 0.0])
+    out = np.array([2.0, 0.0, 1.0])
+    next_gap = out + np.array([leg, 0.0, 0.0])
+    between = [next_gap] if leg else []
+    path = np.array([(0, 0, 1), (1, 0, 1), out, *between, next_gap + way, next_gap + 3 * way])
+    narrow = np.isin(np.arange(len(path)), [1, 2 + len(between)])
+    reference, travelled = np.array([0.0, 0, 1, 0, 0, 0, 0]), math.nan
+    p_WB, yaw = reference[:3], 0.0
+    for _ in range(1500):
+        *moved, travelled = follow(
+            path, narrow, reference, p_WB, yaw, travelled, False, 4.0, LIMITS
+        )
+        reference = np.array(moved)
+        if p_WB[0] < out[0] - GATE:
+            assert reference[3] == pytest.approx(0.0, abs=1e-9)
+        if 2.0 + leg + GATE < travelled < 2.0 + leg + 0.2:
+            off = p_WB - next_gap
+            assert off @ way > -GATE - leg
+            assert np.linalg.norm(off - (off @ way) * way) < IN_LINE
+            assert abs(yaw - turn) < NOSE_IN_LINE
+        # It is half a second late.
+        p_WB = p_WB + (reference[:3] - p_WB) * (LIMITS.period / 0.5)
+        yaw += (reference[3] - yaw) * (LIMITS.period / 0.5)
+    np.testing.assert_allclose(reference[:3], path[-1], atol=0.02)

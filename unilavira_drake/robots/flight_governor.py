@@ -28,8 +28,8 @@ from unilavira_drake.robots.flight_stopping import (
 )
 from unilavira_drake.robots.stopping import stoppable_speed
 
-BESIDE = 0.01
-"""Kept free beside the aircraft, metres."""
+LEAST_BESIDE = 0.01
+"""Without so much free beside the aircraft, metres, the setpoint does not move on."""
 LEASH = 1.5
 """The setpoint is never farther from the aircraft than this, metres."""
 BRAKING_SHARE = 0.8
@@ -54,7 +54,9 @@ class FlightGovernor(LeafSystem):
       as free: no camera looks up, so a climb is checked only against what was mapped before.
       Beside its way so much is free as the aircraft is wide for its yaw: less in a gap through
       which it flies straight than where it turns.
-    * It turns on the spot unless its corners would meet an occupied voxel.
+    * Neither in flight nor on the spot does it turn where its corners would meet an occupied voxel
+      that they do not meet yet.  It keeps its yaw until they would not: it tries only the short
+      way round, even where the long one is free.
 
     The state is the setpoint, NaN until pose and command are known and finite ever after, and when
     the pose last changed.
@@ -149,7 +151,7 @@ class FlightGovernor(LeafSystem):
             if distance > leash:
                 setpoint[:3] = p_WB + behind * (min(leash, LEASH) / distance)
         followed = valid and not lost
-        # The setpoint's aircraft is as wide as the true one if that is turned farther.
+        # The setpoint's aircraft is as wide as any between it and the true one, which comes after.
         yaws = (float(setpoint[3]), math.atan2(X_WB[1, 0], X_WB[0, 0]) if seen else math.nan)
         v = self._velocity(context, setpoint, yaws, np.array(desired[:7]) if followed else None)
         setpoint[4:] = v
@@ -198,8 +200,8 @@ class FlightGovernor(LeafSystem):
         if context.get_time() - map_.time > self._map_timeout:
             return slower
         direction = v / speed
-        beside = max(half_width(self._size, yaw, direction) for yaw in yaws if not math.isnan(yaw))
-        allowed = self._allowed_speed(map_, setpoint[:3], direction, speed, beside + BESIDE)
+        beside = width_between(self._size, yaws, direction)
+        allowed = self._allowed_speed(map_, setpoint[:3], direction, speed, beside + LEAST_BESIDE)
         if allowed >= speed:
             return v
         v = v * (allowed / speed)
@@ -239,6 +241,30 @@ class FlightGovernor(LeafSystem):
             turn_meets(voxels, corner, bounds, map_.resolution, *turn)
             for voxels, corner in _tiles(map_, bounds)
         )
+
+
+def width_between(size: Size, yaws: tuple[float, float], direction: NDArray[np.float64]) -> float:
+    """Returns how far a rectangle reaches beside a way at most while it turns, metres.
+
+    Args:
+        size: of the rectangle, metres.
+        yaws: between which it turns, the short way round, radians; the second may be NaN.
+        direction: (3,) of the way.
+    """
+    first, second = yaws
+    width = half_width(size, first, direction)
+    if math.isnan(second):
+        return width
+    turn = math.atan2(math.sin(second - first), math.cos(second - first))
+    width = max(width, half_width(size, second, direction))
+    # It is widest where a diagonal is across the way.
+    begin = first - math.atan2(direction[1], direction[0])
+    low, high = min(begin, begin + turn), max(begin, begin + turn)
+    diagonal = math.atan2(size[0], size[1])
+    for widest in (diagonal, -diagonal):
+        if widest + math.pi * math.ceil((low - widest) / math.pi) < high:
+            return 0.5 * math.hypot(*size)
+    return width
 
 
 def _tiles(

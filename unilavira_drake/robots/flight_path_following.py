@@ -45,6 +45,8 @@ GATE = 0.05
 IN_LINE = 0.03
 NOSE_IN_LINE = 0.05
 """... until the aircraft is no farther off the line, metres, nor its nose, radians."""
+ROOM = 0.15
+"""In a gap an aircraft cannot be farther off its line than this, metres."""
 
 
 @kernel
@@ -114,37 +116,6 @@ def corner_speed(
 
 
 @kernel
-def gap_at(
-    p_WP: NDArray[np.float64],
-    narrow: NDArray[np.bool_],
-    segment: int,
-    along: float,
-    p_WB: NDArray[np.float64],
-) -> int:
-    """Returns the narrow segment in or before which reference or aircraft are; -1: none.
-
-    Args:
-        p_WP: (k, 3) the path, metres.
-        narrow: (k,) which of its segments are.
-        segment: on which the reference is, ...
-        along: ... so far, metres.
-        p_WB: (3,) where the aircraft is.
-    """
-    if narrow[segment]:
-        return segment
-    if segment > 0 and narrow[segment - 1]:
-        # The reference leaves a gap before the aircraft does.
-        step = p_WP[segment] - p_WP[segment - 1]
-        if np.sum((p_WB - p_WP[segment]) * step) < 0.0:
-            return segment - 1
-    if segment + 1 < len(p_WP) and narrow[segment + 1]:
-        step = p_WP[segment + 1] - p_WP[segment]
-        if math.sqrt(np.sum(step * step)) - along < GATE:
-            return segment + 1
-    return -1
-
-
-@kernel
 def off_line(p_WP: NDArray[np.float64], segment: int, p_WB: NDArray[np.float64]) -> float:
     """Returns how far a point is from the line of a segment, metres."""
     step = p_WP[segment + 1] - p_WP[segment]
@@ -154,16 +125,64 @@ def off_line(p_WP: NDArray[np.float64], segment: int, p_WB: NDArray[np.float64])
 
 
 @kernel
+def gap_at(
+    p_WP: NDArray[np.float64],
+    narrow: NDArray[np.bool_],
+    segment: int,
+    along: float,
+    p_WB: NDArray[np.float64],
+) -> int:
+    """Returns the narrow segment in or before which aircraft or reference are; -1: none.
+
+    One that the aircraft has not left counts, though the reference may wait before the next.
+
+    Args:
+        p_WP: (k, 3) the path, metres.
+        narrow: (k,) which of its segments are.
+        segment: on which the reference is, ...
+        along: ... so far, metres.
+        p_WB: (3,) where the aircraft is.
+    """
+    gap, gate, last, beyond = -1, False, segment - 1, along
+    if segment + 1 < len(p_WP) and narrow[segment + 1]:
+        step = p_WP[segment + 1] - p_WP[segment]
+        gate = math.sqrt(np.sum(step * step)) - along < GATE
+    if gate:
+        gap, last, beyond = segment + 1, segment, 0.0
+    elif narrow[segment]:
+        if along >= GATE:
+            # It went on because the aircraft was in line with it, and so out of the one before.
+            return segment
+        gap, gate = segment, True
+    # The reference leaves a gap before the aircraft does.  Where it waits for the aircraft, that
+    # may never come wholly to where the gap ends.
+    slack = GATE if gate else 0.0
+    for i in range(last, -1, -1):
+        if beyond > 2.0 * LAG:
+            break
+        step = p_WP[i + 1] - p_WP[i]
+        length = math.sqrt(np.sum(step * step))
+        if narrow[i] and np.sum((p_WB - p_WP[i + 1]) * step) < -slack * length:
+            if off_line(p_WP, i, p_WB) < ROOM:
+                gap = i
+        beyond += length
+    return gap
+
+
+@kernel
 def _speed_ahead(
     p_WP: NDArray[np.float64],
     narrow: NDArray[np.bool_],
     segment: int,
     along: float,
-    in_line: bool,
+    closed: int,
     acceleration: float,
     limits: FlightLimits,
 ) -> float:
-    """Returns the speed from which every corner, slope, gap and the end can still be met, m/s."""
+    """Returns the speed from which every corner, slope, gap and the end can still be met, m/s.
+
+    It stops before the gaps from the segment ``closed`` on.
+    """
     speed, distance = np.inf, -along
     before = np.zeros(3)
     for i in range(segment, len(p_WP) - 1):
@@ -175,7 +194,7 @@ def _speed_ahead(
         bound = speed_along(direction, limits)
         if narrow[i]:
             bound = min(bound, NARROW_SPEED)
-            if distance > -GATE and not in_line:
+            if i >= closed and distance > -GATE:
                 stop = braking_speed(max(distance, 0.0), acceleration, limits.period)
                 return min(speed, stop)
         if distance > 0.0:
@@ -243,7 +262,9 @@ def follow(
     heading = reference[3] if gap < 0 else _heading(p_WP[gap + 1] - p_WP[gap])
     in_line = gap >= 0 and _off(heading, yaw) < NOSE_IN_LINE
     in_line = in_line and off_line(p_WP, gap, p_WB) < IN_LINE
-    speed = _speed_ahead(p_WP, narrow, segment, along, in_line, acceleration, limits)
+    # In line with one gap is not in line with the next.
+    closed = gap + 1 if in_line else gap
+    speed = _speed_ahead(p_WP, narrow, segment, along, closed, acceleration, limits)
     behind = math.sqrt(np.sum((reference[:3] - p_WB) ** 2))
     speed = min(speed, limits.max_speed * min(max(2.0 - behind / LAG, 0.0), 1.0))
     ahead, _ = advance(p_WP, segment, along, max(previous * LOOKAHEAD_TIME, MIN_LOOKAHEAD))
