@@ -120,6 +120,43 @@ def test_two_gaps_one_after_the_other():
     assert corners_are_free(plan, 0.0, doors)
 
 
+@pytest.mark.parametrize("degrees", [0, 30, 180])
+@pytest.mark.parametrize("across", [-0.1, 0.0, 0.1])
+@pytest.mark.parametrize("off", [-0.03, 0.03])
+def test_who_is_in_a_gap_leaves_it_straight_towards_the_goal(degrees, across, off):
+    angle, doors = math.radians(degrees), [(0.0, 0.013, 0.513)]
+    space = space_of(rooms(angle, doors))
+    start, ahead, behind = turned(
+        angle, [(across, 0.013 + off, 1.2), (1.7, -1.2, 1.2), (-1.7, 1.2, 1.0)]
+    )
+    for goal, way in ((ahead, 1), (behind, -1)):
+        plan = planned(space, start, goal)
+        assert (plan.reason, plan.elsewhere, plan.narrow) == ("", False, (0,))
+        np.testing.assert_allclose(plan.p_WP[[0, -1]], [start, goal], atol=1e-9)
+        out = turned(-angle, plan.p_WP[1:2])[0] * way
+        assert 0.3 < out[0] < 0.8
+        assert abs(out[1] - way * 0.013) < 0.06
+        assert (np.diff(turned(-angle, plan.p_WP)[:, 0]) * way > 0).all()
+
+
+def test_who_is_between_two_gaps_of_which_one_is_behind_leaves_forwards():
+    doors = [(-0.8, 0.0, 0.52), (0.8, -0.9, 0.55)]
+    plan = planned(space_of(rooms(0.0, doors)), (-0.8, 0.0, 1.0), (1.8, 0.0, 1.0))
+    assert (plan.reason, len(plan.narrow), plan.narrow[0]) == ("", 2, 0)
+    assert (np.diff(plan.p_WP[:, 0]) > -1e-9).all()
+
+
+def test_who_is_near_a_wall_or_on_the_floor_is_in_no_gap():
+    space = space_of(rooms(0.0, [(0.0, 0.0, 0.8)]))
+    for start in ((-1.5, 2.2, 1.0), (-0.2, 1.5, 1.0), (-1.5, 1.0, 0.2), (-0.1, 0.2, 1.0)):
+        plan, goal = planned(space, start, (1.5, 1.0, 1.4)), (1.5, 1.0, 1.4)
+        usual = make_flight_plan(
+            space, position=start, target=goal, viewpoint=start, parameters=PARAMETERS
+        )
+        np.testing.assert_array_equal(plan.p_WP, usual.p_WP)
+        assert (plan.reason, plan.narrow) == ("", ())
+
+
 def test_a_way_with_room_to_turn_is_the_same_as_without_gaps():
     space = space_of(rooms(0.0, [(0.0, 0.0, 0.8)]))
     start, goal = (-1.5, 1.2, 1.0), (1.5, 1.0, 1.4)

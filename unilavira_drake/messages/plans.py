@@ -84,7 +84,8 @@ class Path(Message):
     """Whether the robot goes it backwards, without turning, to get off where it is stuck."""
     narrow: tuple[int, ...] = ()
     """Segments, by the index of their first point, that lead straight through a gap in which an
-    aircraft does not turn."""
+    aircraft does not turn.  If the first one does, the aircraft is in that gap: it leaves it nose
+    or tail first."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))

@@ -23,13 +23,14 @@ from unilavira_drake.planning.visibility import (
     FlightParameters,
     FlightPlan,
     Point,
+    believable,
     escape,
     make_flight_plan,
     margins,
     route,
     window_around,
 )
-from unilavira_drake.planning.visibility_gaps import best_line, free_beside
+from unilavira_drake.planning.visibility_gaps import REACH, RUN_IN, best_line, free_beside
 from unilavira_drake.planning.visibility_lines import unfold
 from unilavira_drake.planning.visibility_path import path_is_blocked, remaining_way
 from unilavira_drake.planning.visibility_snapping import snap_goal, way_out
@@ -60,6 +61,7 @@ def make_plan(
     """Returns a plan with room to turn, or one through gaps where there is no other.
 
     Voxels larger than the narrow radius show no gaps: too little is known of where their sides are.
+    Out of a gap in which the aircraft is already it flies straight, whichever way is shorter.
 
     Args:
         space: where the aircraft may fly and turn.
@@ -67,6 +69,48 @@ def make_plan(
         places: as those of :func:`make_flight_plan`.
         parameters: size and limits.
     """
+    position, target, viewpoint, goal = places
+    ways = []
+    for out in _ways_out(space, position, parameters):
+        plan, tight = _plan(space, tight, (out, target, viewpoint, goal), parameters)
+        if not plan.reason:
+            ways.append(_from(position, plan, narrow=True))
+    if ways:
+        return min(ways, key=lambda plan: (plan.elsewhere, plan.length)), tight
+    return _plan(space, tight, places, parameters)
+
+
+def _ways_out(
+    space: FlightSpace, position: Point, parameters: FlightParameters
+) -> tuple[Point, ...]:
+    """Returns the two ends of the gap in which an aircraft is; none: it is in no gap.
+
+    What has less free than a gap needs, by no more than a voxel, is one too: it is there already.
+    """
+    resolution, radius = space.voxels.resolution, parameters.narrow_radius
+    if radius is None or radius < resolution or not believable(position):
+        return ()
+    margin = math.ceil((REACH + RUN_IN) / resolution)
+    window = window_around(space, (position,), margin, parameters)
+    if window is None or not window.is_blocked(window.point(position)):
+        return ()
+    here = window.point(position)
+    line, free = best_line(space, here[None], window, window)
+    if not radius - resolution <= free < space.clearance.radius:
+        return ()
+    p_WA, p_WB = window.world(line)
+    way = p_WB[:2] - p_WA[:2]
+    off = np.array(position[:2]) - p_WA[:2]
+    off -= way * (float(off @ way) / float(way @ way))
+    if math.hypot(*off) > space.clearance.radius - radius + resolution:
+        return ()
+    return tuple((float(x), float(y), float(z)) for x, y, z in (p_WB, p_WA))
+
+
+def _plan(
+    space: FlightSpace, tight: FlightSpace, places: Places, parameters: FlightParameters
+) -> tuple[FlightPlan, FlightSpace]:
+    """Returns the plan of an aircraft that is in no gap; see :func:`make_plan`."""
     position, target, viewpoint, goal = places
     plan = make_flight_plan(
         space,
@@ -127,13 +171,14 @@ def make_plan_through_gaps(
     return FlightPlan(reason=reason)
 
 
-def _from(position: Point, plan: FlightPlan) -> FlightPlan:
-    """Returns a plan that begins at the aircraft."""
+def _from(position: Point, plan: FlightPlan, *, narrow: bool = False) -> FlightPlan:
+    """Returns a plan that begins at the aircraft; ``narrow`` tells whether that is in a gap."""
     out = math.dist(plan.p_WP[0], position)
     if out <= 1e-9:
         return plan
     p_WP = np.concatenate((np.array([position]), plan.p_WP))
-    return FlightPlan(p_WP, plan.length + out, narrow=tuple(k + 1 for k in plan.narrow))
+    segments = (*((0,) if narrow else ()), *(k + 1 for k in plan.narrow))
+    return dc.replace(plan, p_WP=p_WP, length=plan.length + out, narrow=segments)
 
 
 def _through_gaps(
