@@ -10,9 +10,9 @@ from unilavira_drake.messages import Path, VoxelMap
 from unilavira_drake.planning.visibility import FlightParameters, make_flight_plan
 from unilavira_drake.planning.visibility_gaps import free_beside
 from unilavira_drake.planning.visibility_narrow import (
-    in_a_gap,
     make_plan,
     near_a_gap,
+    out_of_gaps,
     way_is_blocked,
 )
 from unilavira_drake.planning.visibility_space import Clearance, FlightSpace, update_space
@@ -253,6 +253,21 @@ def test_near_and_in_a_gap():
     path = Path(1, 0, p_WP, narrow=(1,))
     expected = {(-3.0, 1.0): (0, 0), (-0.9, 0.15): (0, 1), (0.0, 0.03): (1, 1), (1.0, 0.3): (0, 0)}
     for (x, y), (inside, near) in expected.items():
-        assert in_a_gap(path, (x, y, 1.0)) == bool(inside)
+        assert out_of_gaps(path, (x, y, 1.0)) == (not inside)
         assert near_a_gap(path, (x, y, 1.0)) == bool(near)
     assert not near_a_gap(Path(1, 0, p_WP), (0.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("across", [0.2, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6])
+def test_a_goal_just_behind_a_gap_is_not_overshot(across):
+    space = space_of(rooms(0.0, [(0.0, 0.013, 0.513)]))
+    plan = planned(space, (-1.6, 1.5, 1.2), (across, 0.013, 1.2))
+    assert (plan.reason, plan.elsewhere, len(plan.narrow)) == ("", False, 1)
+    end = plan.p_WP[-1]
+    assert np.abs(end - [across, 0.013, 1.2]).max() < (0.03 if across >= 0.3 else 0.15)
+    assert plan.p_WP[:, 0].max() < max(end[0], 0.35) + 0.026
+    # It may arrive there, wherever its estimate puts it.
+    path = Path(1, 0, plan.p_WP, narrow=plan.narrow)
+    noisy = end + np.random.default_rng(0).normal(0.0, 0.02, (200, 3))
+    assert np.mean([out_of_gaps(path, tuple(point)) for point in noisy]) > 0.95
+    assert not out_of_gaps(path, (0.1, 0.0, 1.2))

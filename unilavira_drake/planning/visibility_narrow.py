@@ -30,7 +30,7 @@ from unilavira_drake.planning.visibility import (
     route,
     window_around,
 )
-from unilavira_drake.planning.visibility_gaps import REACH, RUN_IN, best_line, free_beside
+from unilavira_drake.planning.visibility_gaps import REACH, RUN_IN, RUN_OUT, best_line, free_beside
 from unilavira_drake.planning.visibility_lines import unfold
 from unilavira_drake.planning.visibility_path import path_is_blocked, remaining_way
 from unilavira_drake.planning.visibility_snapping import snap_goal, way_out
@@ -39,6 +39,9 @@ from unilavira_drake.planning.visibility_window import FlightWindow, reachable
 
 BEFORE_A_GAP = 1.0
 """Who is nearer to a gap than this does not plan anew without need, metres."""
+
+AT_THE_END = 0.06
+"""Who is nearer than this to the end of its path is in no gap, metres."""
 
 MOST_GAPS = 8
 """So many gaps are looked at that turn out to be too narrow."""
@@ -224,15 +227,37 @@ def _legs(
         rest = (i for i in range(last + 1, len(points)) if open_to_turn[i])
         k = next(rest, len(points) - 1)
         gap = points[last : k + 1]
-        line, free = best_line(space, gap, region, reachable(window, points[k]))
+        beyond = reachable(window, points[k])
+        line, free = best_line(space, gap, region, beyond)
         if free < parameters.narrow_radius - 1e-6:
             return gap
+        line[1] = _end(line, nodes[-1], beyond)
         legs += [_leg(window, here, line[0], parameters), line]
         here = line[1]
     legs.append(_leg(window, here, nodes[-1], parameters))
     if not all(map(len, legs)):
         return FlightPlan(reason=TOO_MANY)
     return _joined(window, legs, parameters)
+
+
+def _end(
+    line: NDArray[np.float64], goal: NDArray[np.float64], beyond: FlightWindow
+) -> NDArray[np.float64]:
+    """Returns where a line through a gap ends: beside a goal that lies just behind the gap."""
+    begin: NDArray[np.float64] = line[0]
+    end: NDArray[np.float64] = line[1].copy()
+    way: NDArray[np.float64] = end - begin
+    length = math.hypot(*way)
+    run = RUN_OUT / beyond.resolution
+    t = max(float((goal - begin) @ way) / length, 0.0)
+    if t >= length or math.dist(begin + way * (t / length), goal) > run:
+        return end
+    while t < length:
+        point: NDArray[np.float64] = begin + way * (t / length)
+        if not beyond.is_blocked(point):
+            return point
+        t += 0.5
+    return end
 
 
 def _leg(
@@ -309,9 +334,16 @@ def _blocked(space: FlightSpace, way: list[NDArray[np.float64]]) -> bool:
     return path_is_blocked(space, np.array(way), position=(x, y, z))
 
 
-def in_a_gap(path: Path, position: Point) -> bool:
-    """Returns whether an aircraft is on its way through a gap."""
-    return bool(path.narrow) and remaining_way(path.p_WP, position)[1] - 1 in path.narrow
+def out_of_gaps(path: Path, position: Point) -> bool:
+    """Returns whether an aircraft is in no gap of its path; one that ends right behind it is past.
+
+    Near to the end of such a path nobody can tell on which of its segments the aircraft is.
+    """
+    _, ahead = remaining_way(path.p_WP, position)
+    if ahead - 1 not in path.narrow or math.dist(path.p_WP[-1], position) < AT_THE_END:
+        return True
+    a, b = path.p_WP[ahead - 1], path.p_WP[ahead]
+    return float((np.array(position) - b) @ (b - a)) >= 0.0
 
 
 def near_a_gap(path: Path, position: Point) -> bool:
