@@ -1,5 +1,6 @@
 """Gaps without room to turn: found where there is no other way, and passed straight."""
 
+import dataclasses as dc
 import math
 
 import flight_worlds as worlds
@@ -271,3 +272,20 @@ def test_a_goal_just_behind_a_gap_is_not_overshot(across):
     noisy = end + np.random.default_rng(0).normal(0.0, 0.02, (200, 3))
     assert np.mean([out_of_gaps(path, tuple(point)) for point in noisy]) > 0.95
     assert not out_of_gaps(path, (0.1, 0.0, 1.2))
+
+
+def test_a_narrow_segment_is_one_of_the_path():
+    p_WP = np.array([[0.0, 0, 1], [1, 0, 1], [2, 0, 1]])
+    assert Path(1, 0, p_WP, narrow=(0, 1)).narrow == (0, 1)
+    for k in (-1, 2):
+        with pytest.raises(ValueError, match=f"narrow segment {k} "):
+            Path(1, 0, p_WP, narrow=(k,))
+
+
+def test_no_gaps_are_looked_for_that_are_as_wide_as_it_takes_to_turn():
+    space = space_of(rooms(0.0, [(0.0, 0.0, 0.3)]))
+    places = ((-1.5, 0.0, 1.0), (1.5, 0.0, 1.0), (-1.5, 0.0, 1.0), None)
+    for radius, looked in ((NARROW, True), (RADIUS, False)):
+        parameters = dc.replace(PARAMETERS, narrow_radius=radius)
+        plan, tight = make_plan(space, FlightSpace(), places=places, parameters=parameters)
+        assert (plan.reason, bool(tight.voxels.tiles)) == ("unreachable", looked)

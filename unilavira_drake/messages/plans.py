@@ -71,7 +71,11 @@ class NavigationStatus(Message):
 
 @dataclass(frozen=True, eq=False)
 class Path(Message):
-    """A polyline on the floor, or in the air, for goal ``n``; empty once the goal is done."""
+    """A polyline on the floor, or in the air, for goal ``n``; empty once the goal is done.
+
+    Raises:
+        ValueError: if a narrow segment is none of the path's.
+    """
 
     n: int = 0
     version: int = 0
@@ -89,6 +93,9 @@ class Path(Message):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))
+        for k in self.narrow:
+            if not 0 <= k < len(self.p_WP) - 1:
+                raise ValueError(f"narrow segment {k} is none of a path of {len(self.p_WP)} points")
 
 
 @dataclass(frozen=True)

@@ -63,8 +63,9 @@ def make_plan(
 ) -> tuple[FlightPlan, FlightSpace]:
     """Returns a plan with room to turn, or one through gaps where there is no other.
 
-    Voxels larger than the narrow radius show no gaps: too little is known of where their sides are.
-    Out of a gap in which the aircraft is already it flies straight, whichever way is shorter.
+    So it does in place of a plan that ends elsewhere than at the goal.  Voxels larger than the
+    narrow radius show no gaps: too little is known of where their sides are.  A gap in which the
+    aircraft already is it leaves straight, by the end from which the way is shorter.
 
     Args:
         space: where the aircraft may fly and turn.
@@ -83,6 +84,11 @@ def make_plan(
     return _plan(space, tight, places, parameters)
 
 
+def _has_gaps(space: FlightSpace, narrow_radius: float) -> bool:
+    """Returns whether there may be gaps too narrow to turn, and voxels that show them."""
+    return space.voxels.resolution <= narrow_radius < space.clearance.radius
+
+
 def _ways_out(
     space: FlightSpace, position: Point, parameters: FlightParameters
 ) -> tuple[Point, ...]:
@@ -91,7 +97,7 @@ def _ways_out(
     What has less free than a gap needs, by no more than a voxel, is one too: it is there already.
     """
     resolution, radius = space.voxels.resolution, parameters.narrow_radius
-    if radius is None or radius < resolution or not believable(position):
+    if radius is None or not _has_gaps(space, radius) or not believable(position):
         return ()
     margin = math.ceil((REACH + RUN_IN) / resolution)
     window = window_around(space, (position,), margin, parameters)
@@ -124,9 +130,10 @@ def _plan(
         parameters=parameters,
     )
     wanted, resolution = plan.reason == UNREACHABLE or plan.elsewhere, space.voxels.resolution
-    if parameters.narrow_radius is None or parameters.narrow_radius < resolution or not wanted:
+    radius = parameters.narrow_radius
+    if radius is None or not _has_gaps(space, radius) or not wanted:
         return plan, tight
-    clearance = narrow_clearance(space.clearance, parameters.narrow_radius, resolution)
+    clearance = narrow_clearance(space.clearance, radius, resolution)
     if tight.clearance != clearance:
         tight = FlightSpace(clearance=clearance)
     tight = update_space(tight, space.voxels)
@@ -277,14 +284,13 @@ def _joined(
     """Returns the plan of legs of which every other one leads through a gap."""
     p_WP, narrow = [window.world(legs[0][0])], []
     for number, leg in enumerate(legs):
-        if number % 2:
-            narrow.append(len(p_WP) - 1)
-            way = leg
-        else:
-            way = unfold(window.words, leg, parameters.slopes) if len(leg) > 1 else leg
-        for point in window.world(way):
+        straight = number % 2 or len(leg) == 1
+        way = leg if straight else unfold(window.words, leg, parameters.slopes)
+        for k, point in enumerate(window.world(way)):
             if math.dist(point, p_WP[-1]) > 1e-9:
                 p_WP.append(point)
+            if number % 2 and k == 0:
+                narrow.append(len(p_WP) - 1)
     path = np.array(p_WP)
     length = sum(math.dist(a, b) for a, b in itertools.pairwise(path))
     return FlightPlan(path, length, narrow=tuple(narrow))
