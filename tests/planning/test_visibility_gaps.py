@@ -1,5 +1,6 @@
 """Gaps without room to turn: found where there is no other way, and passed straight."""
 
+import dataclasses as dc
 import math
 
 import flight_worlds as worlds
@@ -10,9 +11,9 @@ from unilavira_drake.messages import Path, VoxelMap
 from unilavira_drake.planning.visibility import FlightParameters, make_flight_plan
 from unilavira_drake.planning.visibility_gaps import free_beside
 from unilavira_drake.planning.visibility_narrow import (
-    in_a_gap,
     make_plan,
     near_a_gap,
+    out_of_gaps,
     way_is_blocked,
 )
 from unilavira_drake.planning.visibility_space import Clearance, FlightSpace, update_space
@@ -120,6 +121,43 @@ def test_two_gaps_one_after_the_other():
     assert corners_are_free(plan, 0.0, doors)
 
 
+@pytest.mark.parametrize("degrees", [0, 30, 180])
+@pytest.mark.parametrize("across", [-0.1, 0.0, 0.1])
+@pytest.mark.parametrize("off", [-0.03, 0.03])
+def test_who_is_in_a_gap_leaves_it_straight_towards_the_goal(degrees, across, off):
+    angle, doors = math.radians(degrees), [(0.0, 0.013, 0.513)]
+    space = space_of(rooms(angle, doors))
+    start, ahead, behind = turned(
+        angle, [(across, 0.013 + off, 1.2), (1.7, -1.2, 1.2), (-1.7, 1.2, 1.0)]
+    )
+    for goal, way in ((ahead, 1), (behind, -1)):
+        plan = planned(space, start, goal)
+        assert (plan.reason, plan.elsewhere, plan.narrow) == ("", False, (0,))
+        np.testing.assert_allclose(plan.p_WP[[0, -1]], [start, goal], atol=1e-9)
+        out = turned(-angle, plan.p_WP[1:2])[0] * way
+        assert 0.3 < out[0] < 0.8
+        assert abs(out[1] - way * 0.013) < 0.06
+        assert (np.diff(turned(-angle, plan.p_WP)[:, 0]) * way > 0).all()
+
+
+def test_who_is_between_two_gaps_of_which_one_is_behind_leaves_forwards():
+    doors = [(-0.8, 0.0, 0.52), (0.8, -0.9, 0.55)]
+    plan = planned(space_of(rooms(0.0, doors)), (-0.8, 0.0, 1.0), (1.8, 0.0, 1.0))
+    assert (plan.reason, len(plan.narrow), plan.narrow[0]) == ("", 2, 0)
+    assert (np.diff(plan.p_WP[:, 0]) > -1e-9).all()
+
+
+def test_who_is_near_a_wall_or_on_the_floor_is_in_no_gap():
+    space = space_of(rooms(0.0, [(0.0, 0.0, 0.8)]))
+    for start in ((-1.5, 2.2, 1.0), (-0.2, 1.5, 1.0), (-1.5, 1.0, 0.2), (-0.1, 0.2, 1.0)):
+        plan, goal = planned(space, start, (1.5, 1.0, 1.4)), (1.5, 1.0, 1.4)
+        usual = make_flight_plan(
+            space, position=start, target=goal, viewpoint=start, parameters=PARAMETERS
+        )
+        np.testing.assert_array_equal(plan.p_WP, usual.p_WP)
+        assert (plan.reason, plan.narrow) == ("", ())
+
+
 def test_a_way_with_room_to_turn_is_the_same_as_without_gaps():
     space = space_of(rooms(0.0, [(0.0, 0.0, 0.8)]))
     start, goal = (-1.5, 1.2, 1.0), (1.5, 1.0, 1.4)
@@ -216,6 +254,38 @@ def test_near_and_in_a_gap():
     path = Path(1, 0, p_WP, narrow=(1,))
     expected = {(-3.0, 1.0): (0, 0), (-0.9, 0.15): (0, 1), (0.0, 0.03): (1, 1), (1.0, 0.3): (0, 0)}
     for (x, y), (inside, near) in expected.items():
-        assert in_a_gap(path, (x, y, 1.0)) == bool(inside)
+        assert out_of_gaps(path, (x, y, 1.0)) == (not inside)
         assert near_a_gap(path, (x, y, 1.0)) == bool(near)
     assert not near_a_gap(Path(1, 0, p_WP), (0.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("across", [0.2, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6])
+def test_a_goal_just_behind_a_gap_is_not_overshot(across):
+    space = space_of(rooms(0.0, [(0.0, 0.013, 0.513)]))
+    plan = planned(space, (-1.6, 1.5, 1.2), (across, 0.013, 1.2))
+    assert (plan.reason, plan.elsewhere, len(plan.narrow)) == ("", False, 1)
+    end = plan.p_WP[-1]
+    assert np.abs(end - [across, 0.013, 1.2]).max() < (0.03 if across >= 0.3 else 0.15)
+    assert plan.p_WP[:, 0].max() < max(end[0], 0.35) + 0.026
+    # It may arrive there, wherever its estimate puts it.
+    path = Path(1, 0, plan.p_WP, narrow=plan.narrow)
+    noisy = end + np.random.default_rng(0).normal(0.0, 0.02, (200, 3))
+    assert np.mean([out_of_gaps(path, tuple(point)) for point in noisy]) > 0.95
+    assert not out_of_gaps(path, (0.1, 0.0, 1.2))
+
+
+def test_a_narrow_segment_is_one_of_the_path():
+    p_WP = np.array([[0.0, 0, 1], [1, 0, 1], [2, 0, 1]])
+    assert Path(1, 0, p_WP, narrow=(0, 1)).narrow == (0, 1)
+    for k in (-1, 2):
+        with pytest.raises(ValueError, match=f"narrow segment {k} "):
+            Path(1, 0, p_WP, narrow=(k,))
+
+
+def test_no_gaps_are_looked_for_that_are_as_wide_as_it_takes_to_turn():
+    space = space_of(rooms(0.0, [(0.0, 0.0, 0.3)]))
+    places = ((-1.5, 0.0, 1.0), (1.5, 0.0, 1.0), (-1.5, 0.0, 1.0), None)
+    for radius, looked in ((NARROW, True), (RADIUS, False)):
+        parameters = dc.replace(PARAMETERS, narrow_radius=radius)
+        plan, tight = make_plan(space, FlightSpace(), places=places, parameters=parameters)
+        assert (plan.reason, bool(tight.voxels.tiles)) == ("unreachable", looked)

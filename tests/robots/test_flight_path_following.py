@@ -214,3 +214,14 @@ def test_before_the_next_gap_too_it_waits_for_an_aircraft_that_lags(leg, degrees
         p_WB = p_WB + (reference[:3] - p_WB) * (LIMITS.period / 0.5)
         yaw += (reference[3] - yaw) * (LIMITS.period / 0.5)
     np.testing.assert_allclose(reference[:3], path[-1], atol=0.02)
+
+
+@pytest.mark.parametrize("yaw", [0.03, math.pi - 0.03, -3.0])
+def test_who_is_in_a_gap_leaves_it_as_its_nose_points(yaw):
+    path = [(0.0, 0.0, 1.0), (0.6, 0.0, 1.0), (2.0, 1.5, 1.0)]
+    rows = flown(path, yaw=yaw, narrow=[0])
+    inside = rows[:, 0] < 0.6 - 1e-9
+    turned = np.abs(np.arctan2(np.sin(rows[:, 3] - yaw), np.cos(rows[:, 3] - yaw)))
+    assert turned[inside].max() < 0.2
+    np.testing.assert_allclose(rows[-1, :3], path[-1], atol=0.02)
+    assert math.cos(rows[-1, 3] - math.atan2(1.5, 1.4)) > 0.99

@@ -71,7 +71,11 @@ class NavigationStatus(Message):
 
 @dataclass(frozen=True, eq=False)
 class Path(Message):
-    """A polyline on the floor, or in the air, for goal ``n``; empty once the goal is done."""
+    """A polyline on the floor, or in the air, for goal ``n``; empty once the goal is done.
+
+    Raises:
+        ValueError: if a narrow segment is none of the path's.
+    """
 
     n: int = 0
     version: int = 0
@@ -84,10 +88,14 @@ class Path(Message):
     """Whether the robot goes it backwards, without turning, to get off where it is stuck."""
     narrow: tuple[int, ...] = ()
     """Segments, by the index of their first point, that lead straight through a gap in which an
-    aircraft does not turn."""
+    aircraft does not turn.  If the first one does, the aircraft is in that gap: it leaves it nose
+    or tail first."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "p_WP", read_only(self.p_WP))
+        for k in self.narrow:
+            if not 0 <= k < len(self.p_WP) - 1:
+                raise ValueError(f"narrow segment {k} is none of a path of {len(self.p_WP)} points")
 
 
 @dataclass(frozen=True)

@@ -23,13 +23,14 @@ from unilavira_drake.planning.visibility import (
     FlightParameters,
     FlightPlan,
     Point,
+    believable,
     escape,
     make_flight_plan,
     margins,
     route,
     window_around,
 )
-from unilavira_drake.planning.visibility_gaps import best_line, free_beside
+from unilavira_drake.planning.visibility_gaps import REACH, RUN_IN, RUN_OUT, best_line, free_beside
 from unilavira_drake.planning.visibility_lines import unfold
 from unilavira_drake.planning.visibility_path import path_is_blocked, remaining_way
 from unilavira_drake.planning.visibility_snapping import snap_goal, way_out
@@ -38,6 +39,9 @@ from unilavira_drake.planning.visibility_window import FlightWindow, reachable
 
 BEFORE_A_GAP = 1.0
 """Who is nearer to a gap than this does not plan anew without need, metres."""
+
+AT_THE_END = 0.06
+"""Who is nearer than this to the end of its path is in no gap, metres."""
 
 MOST_GAPS = 8
 """So many gaps are looked at that turn out to be too narrow."""
@@ -59,7 +63,9 @@ def make_plan(
 ) -> tuple[FlightPlan, FlightSpace]:
     """Returns a plan with room to turn, or one through gaps where there is no other.
 
-    Voxels larger than the narrow radius show no gaps: too little is known of where their sides are.
+    So it does in place of a plan that ends elsewhere than at the goal.  Voxels larger than the
+    narrow radius show no gaps: too little is known of where their sides are.  A gap in which the
+    aircraft already is it leaves straight, by the end from which the way is shorter.
 
     Args:
         space: where the aircraft may fly and turn.
@@ -67,6 +73,53 @@ def make_plan(
         places: as those of :func:`make_flight_plan`.
         parameters: size and limits.
     """
+    position, target, viewpoint, goal = places
+    ways = []
+    for out in _ways_out(space, position, parameters):
+        plan, tight = _plan(space, tight, (out, target, viewpoint, goal), parameters)
+        if not plan.reason:
+            ways.append(_from(position, plan, narrow=True))
+    if ways:
+        return min(ways, key=lambda plan: (plan.elsewhere, plan.length)), tight
+    return _plan(space, tight, places, parameters)
+
+
+def _has_gaps(space: FlightSpace, narrow_radius: float) -> bool:
+    """Returns whether there may be gaps too narrow to turn, and voxels that show them."""
+    return space.voxels.resolution <= narrow_radius < space.clearance.radius
+
+
+def _ways_out(
+    space: FlightSpace, position: Point, parameters: FlightParameters
+) -> tuple[Point, ...]:
+    """Returns the two ends of the gap in which an aircraft is; none: it is in no gap.
+
+    What has less free than a gap needs, by no more than a voxel, is one too: it is there already.
+    """
+    resolution, radius = space.voxels.resolution, parameters.narrow_radius
+    if radius is None or not _has_gaps(space, radius) or not believable(position):
+        return ()
+    margin = math.ceil((REACH + RUN_IN) / resolution)
+    window = window_around(space, (position,), margin, parameters)
+    if window is None or not window.is_blocked(window.point(position)):
+        return ()
+    here = window.point(position)
+    line, free = best_line(space, here[None], window, window)
+    if not radius - resolution <= free < space.clearance.radius:
+        return ()
+    p_WA, p_WB = window.world(line)
+    way = p_WB[:2] - p_WA[:2]
+    off = np.array(position[:2]) - p_WA[:2]
+    off -= way * (float(off @ way) / float(way @ way))
+    if math.hypot(*off) > space.clearance.radius - radius + resolution:
+        return ()
+    return tuple((float(x), float(y), float(z)) for x, y, z in (p_WB, p_WA))
+
+
+def _plan(
+    space: FlightSpace, tight: FlightSpace, places: Places, parameters: FlightParameters
+) -> tuple[FlightPlan, FlightSpace]:
+    """Returns the plan of an aircraft that is in no gap; see :func:`make_plan`."""
     position, target, viewpoint, goal = places
     plan = make_flight_plan(
         space,
@@ -77,9 +130,10 @@ def make_plan(
         parameters=parameters,
     )
     wanted, resolution = plan.reason == UNREACHABLE or plan.elsewhere, space.voxels.resolution
-    if parameters.narrow_radius is None or parameters.narrow_radius < resolution or not wanted:
+    radius = parameters.narrow_radius
+    if radius is None or not _has_gaps(space, radius) or not wanted:
         return plan, tight
-    clearance = narrow_clearance(space.clearance, parameters.narrow_radius, resolution)
+    clearance = narrow_clearance(space.clearance, radius, resolution)
     if tight.clearance != clearance:
         tight = FlightSpace(clearance=clearance)
     tight = update_space(tight, space.voxels)
@@ -127,13 +181,14 @@ def make_plan_through_gaps(
     return FlightPlan(reason=reason)
 
 
-def _from(position: Point, plan: FlightPlan) -> FlightPlan:
-    """Returns a plan that begins at the aircraft."""
+def _from(position: Point, plan: FlightPlan, *, narrow: bool = False) -> FlightPlan:
+    """Returns a plan that begins at the aircraft; ``narrow`` tells whether that is in a gap."""
     out = math.dist(plan.p_WP[0], position)
     if out <= 1e-9:
         return plan
     p_WP = np.concatenate((np.array([position]), plan.p_WP))
-    return FlightPlan(p_WP, plan.length + out, narrow=tuple(k + 1 for k in plan.narrow))
+    segments = (*((0,) if narrow else ()), *(k + 1 for k in plan.narrow))
+    return dc.replace(plan, p_WP=p_WP, length=plan.length + out, narrow=segments)
 
 
 def _through_gaps(
@@ -179,15 +234,37 @@ def _legs(
         rest = (i for i in range(last + 1, len(points)) if open_to_turn[i])
         k = next(rest, len(points) - 1)
         gap = points[last : k + 1]
-        line, free = best_line(space, gap, region, reachable(window, points[k]))
+        beyond = reachable(window, points[k])
+        line, free = best_line(space, gap, region, beyond)
         if free < parameters.narrow_radius - 1e-6:
             return gap
+        line[1] = _end(line, nodes[-1], beyond)
         legs += [_leg(window, here, line[0], parameters), line]
         here = line[1]
     legs.append(_leg(window, here, nodes[-1], parameters))
     if not all(map(len, legs)):
         return FlightPlan(reason=TOO_MANY)
     return _joined(window, legs, parameters)
+
+
+def _end(
+    line: NDArray[np.float64], goal: NDArray[np.float64], beyond: FlightWindow
+) -> NDArray[np.float64]:
+    """Returns where a line through a gap ends: beside a goal that lies just behind the gap."""
+    begin: NDArray[np.float64] = line[0]
+    end: NDArray[np.float64] = line[1].copy()
+    way: NDArray[np.float64] = end - begin
+    length = math.hypot(*way)
+    run = RUN_OUT / beyond.resolution
+    t = max(float((goal - begin) @ way) / length, 0.0)
+    if t >= length or math.dist(begin + way * (t / length), goal) > run:
+        return end
+    while t < length:
+        point: NDArray[np.float64] = begin + way * (t / length)
+        if not beyond.is_blocked(point):
+            return point
+        t += 0.5
+    return end
 
 
 def _leg(
@@ -207,14 +284,13 @@ def _joined(
     """Returns the plan of legs of which every other one leads through a gap."""
     p_WP, narrow = [window.world(legs[0][0])], []
     for number, leg in enumerate(legs):
-        if number % 2:
-            narrow.append(len(p_WP) - 1)
-            way = leg
-        else:
-            way = unfold(window.words, leg, parameters.slopes) if len(leg) > 1 else leg
-        for point in window.world(way):
+        straight = number % 2 or len(leg) == 1
+        way = leg if straight else unfold(window.words, leg, parameters.slopes)
+        for k, point in enumerate(window.world(way)):
             if math.dist(point, p_WP[-1]) > 1e-9:
                 p_WP.append(point)
+            if number % 2 and k == 0:
+                narrow.append(len(p_WP) - 1)
     path = np.array(p_WP)
     length = sum(math.dist(a, b) for a, b in itertools.pairwise(path))
     return FlightPlan(path, length, narrow=tuple(narrow))
@@ -264,9 +340,16 @@ def _blocked(space: FlightSpace, way: list[NDArray[np.float64]]) -> bool:
     return path_is_blocked(space, np.array(way), position=(x, y, z))
 
 
-def in_a_gap(path: Path, position: Point) -> bool:
-    """Returns whether an aircraft is on its way through a gap."""
-    return bool(path.narrow) and remaining_way(path.p_WP, position)[1] - 1 in path.narrow
+def out_of_gaps(path: Path, position: Point) -> bool:
+    """Returns whether an aircraft is in no gap of its path; one that ends right behind it is past.
+
+    Near to the end of such a path nobody can tell on which of its segments the aircraft is.
+    """
+    _, ahead = remaining_way(path.p_WP, position)
+    if ahead - 1 not in path.narrow or math.dist(path.p_WP[-1], position) < AT_THE_END:
+        return True
+    a, b = path.p_WP[ahead - 1], path.p_WP[ahead]
+    return float((np.array(position) - b) @ (b - a)) >= 0.0
 
 
 def near_a_gap(path: Path, position: Point) -> bool:

@@ -32,9 +32,9 @@ from unilavira_drake.planning.visibility import (
     warm_up,
 )
 from unilavira_drake.planning.visibility_narrow import (
-    in_a_gap,
     make_plan,
     near_a_gap,
+    out_of_gaps,
     way_is_blocked,
 )
 from unilavira_drake.planning.visibility_narrow import warm_up as warm_up_gaps
@@ -286,7 +286,7 @@ class VisibilityPlanner(Level):
             return done(state, n, "failed", "the pose is lost", None) if late else state
         x, y, z = (float(value) for value in state.path.p_WP[-1])
         near = math.dist(position, (x, y, z)) <= self._tolerance
-        if near and not in_a_gap(state.path, position):
+        if near and out_of_gaps(state.path, position):
             # Nobody came from anywhere by a climb at the start.
             came = _arrival(state.path) if n > 0 else None
             heading = came if state.heading is None else state.heading

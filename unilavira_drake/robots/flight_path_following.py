@@ -4,7 +4,8 @@ The reference stays on the path and never outruns the aircraft: it slows down fo
 end, for climbs, while the aircraft lags behind, and while the nose does not yet point ahead.
 
 Through a gap in which there is no room to turn it goes slowly, with the nose along the way until
-the aircraft is out of it.  Before one it waits until the aircraft is in line with it.
+the aircraft is out of it.  Before one it waits until the aircraft is in line with it.  Who is in
+one when the path begins leaves it nose or tail first, as it points.
 """
 
 from __future__ import annotations
@@ -260,6 +261,9 @@ def follow(
     previous = math.sqrt(np.sum(reference[4:7] ** 2))
     gap = gap_at(p_WP, narrow, segment, along, p_WB)
     heading = reference[3] if gap < 0 else _heading(p_WP[gap + 1] - p_WP[gap])
+    if gap == 0 and _off(heading, yaw) > 0.5 * math.pi:
+        # It is in there already and cannot turn about.
+        heading = _heading(p_WP[0] - p_WP[1])
     in_line = gap >= 0 and _off(heading, yaw) < NOSE_IN_LINE
     in_line = in_line and off_line(p_WP, gap, p_WB) < IN_LINE
     # In line with one gap is not in line with the next.
