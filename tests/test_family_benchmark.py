@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import importlib.util
-import sys
-from pathlib import Path
+from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -14,18 +13,10 @@ from unilavira_drake import load_scenario
 from unilavira_drake.worlds.load import load_world
 from unilavira_drake.worlds.start import parse_start
 
-PATH = Path(__file__).resolve().parents[1] / "benchmarks" / "families.py"
-
 
 @pytest.fixture(scope="module")
-def families() -> Any:
-    spec = importlib.util.spec_from_file_location("families_benchmark", PATH)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+def families(benchmark_module: Callable[[str], ModuleType]) -> Any:
+    return benchmark_module("families")
 
 
 def options(**changes: Any) -> argparse.Namespace:

@@ -1,9 +1,6 @@
 """The kernels beside the same work in numpy, which the benchmark measures them against."""
 
-import importlib.util
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,18 +11,13 @@ from unilavira_drake.mapping.depth_view import DepthView
 from unilavira_drake.mapping.occupancy import MappingParameters, integrate
 from unilavira_drake.messages import Intrinsics, OccupancyMap
 
-PATH = Path(__file__).resolve().parents[2] / "benchmarks" / "mapping_peers.py"
 SIDE = 512
 FIRST = (-256, -256)
 
 
 @pytest.fixture(scope="module")
-def peers():
-    spec = importlib.util.spec_from_file_location("mapping_peers", PATH)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+def peers(benchmark_module):
+    return benchmark_module("mapping_peers")
 
 
 def images(kind, rng, depth):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import sys
-from pathlib import Path
+from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,18 +13,10 @@ import pytest
 from unilavira_drake.robots.stopping import Footprint
 from unilavira_drake.scenario import robot_kinds
 
-PATH = Path(__file__).resolve().parents[2] / "benchmarks" / "drives.py"
-
 
 @pytest.fixture(scope="module")
-def drives() -> Any:
-    spec = importlib.util.spec_from_file_location("door_drives", PATH)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+def drives(benchmark_module: Callable[[str], ModuleType]) -> Any:
+    return benchmark_module("drives")
 
 
 @pytest.mark.parametrize("name", ["cobot_magic", "unitree_go1", "unitree_g1"])

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
+from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -15,21 +14,12 @@ from unilavira_drake.robots.flight_governor import LEAST_BESIDE
 from unilavira_drake.robots.flight_path_following import IN_LINE, NOSE_IN_LINE
 from unilavira_drake.robots.quadrotor import Quadrotor
 
-BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 FINE = FlightConfig(resolution=0.05)
 
 
 @pytest.fixture(scope="module")
-def flights() -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        spec = importlib.util.spec_from_file_location("door_flights", BENCHMARKS / "flights.py")
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[spec.name] = module
-        spec.loader.exec_module(module)
-    return module
+def flights(benchmark_module: Callable[[str], ModuleType]) -> Any:
+    return benchmark_module("flights")
 
 
 def test_a_planned_gap_has_room_for_what_counts_as_in_line() -> None:

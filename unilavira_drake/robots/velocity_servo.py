@@ -16,7 +16,6 @@ SAMPLES = (0.7, -1.9)
 """Places of the joints in which their inertia is compared, m or rad: at zero, coupled ones may look
 free, and in one place alone an inertia that changes looks constant."""
 
-
 SMALL = 1e-9
 """What is less by this share is rounding."""
 
