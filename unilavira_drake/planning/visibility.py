@@ -178,21 +178,8 @@ def _plan_in(
     ``places`` are the caller's position, target, viewpoint and goal; ``elsewhere`` tells whether
     the plan may end at another place when there is no way to the free space nearest to the target.
     """
-    position, target, viewpoint, goal = places
-
-    def end_in(free: FlightWindow) -> NDArray[np.float64] | None:
-        return snap_goal(
-            space,
-            free,
-            target=target,
-            position=position,
-            viewpoint=viewpoint,
-            max_distance=parameters.snap_distance,
-        )
-
-    end = None if goal is None else window.point(goal)
-    if end is None or window.is_blocked(end):
-        end = end_in(window)
+    position = places[0]
+    end = end_in(space, window, places, parameters)
     if end is None:
         return FlightPlan(reason=f"no free space within {parameters.snap_distance:g} m")
     slopes = parameters.slopes
@@ -201,7 +188,7 @@ def _plan_in(
     if not len(nodes):
         within_reach = reachable(window, start)
         other = elsewhere and within_reach.is_blocked(end)
-        found = end_in(within_reach) if other else None
+        found = _snapped(space, within_reach, places, parameters) if other else None
         if found is not None:
             nodes = route(window, start, found, slopes)
         if not len(nodes):
@@ -213,6 +200,37 @@ def _plan_in(
     if out > 1e-9:
         p_WP = np.concatenate((np.array([position]), p_WP))
     return FlightPlan(p_WP, length + out, elsewhere=found is not None)
+
+
+def end_in(
+    space: FlightSpace,
+    window: FlightWindow,
+    places: tuple[Point, Point, Point, Point | None],
+    parameters: FlightParameters,
+) -> NDArray[np.float64] | None:
+    """Returns where a way to a target ends: at the goal snapped before, while that is free."""
+    goal = places[3]
+    end = None if goal is None else window.point(goal)
+    if end is None or window.is_blocked(end):
+        return _snapped(space, window, places, parameters)
+    return end
+
+
+def _snapped(
+    space: FlightSpace,
+    window: FlightWindow,
+    places: tuple[Point, Point, Point, Point | None],
+    parameters: FlightParameters,
+) -> NDArray[np.float64] | None:
+    position, target, viewpoint, _ = places
+    return snap_goal(
+        space,
+        window,
+        target=target,
+        position=position,
+        viewpoint=viewpoint,
+        max_distance=parameters.snap_distance,
+    )
 
 
 def route(

@@ -24,6 +24,7 @@ from unilavira_drake.planning.visibility import (
     FlightPlan,
     Point,
     believable,
+    end_in,
     escape,
     make_flight_plan,
     margins,
@@ -33,7 +34,7 @@ from unilavira_drake.planning.visibility import (
 from unilavira_drake.planning.visibility_gaps import REACH, RUN_IN, RUN_OUT, best_line, free_beside
 from unilavira_drake.planning.visibility_lines import unfold
 from unilavira_drake.planning.visibility_path import path_is_blocked, remaining_way
-from unilavira_drake.planning.visibility_snapping import snap_goal, way_out
+from unilavira_drake.planning.visibility_snapping import way_out
 from unilavira_drake.planning.visibility_space import Clearance, FlightSpace, update_space
 from unilavira_drake.planning.visibility_window import FlightWindow, reachable
 
@@ -152,7 +153,7 @@ def make_plan_through_gaps(
         places: as those of :func:`make_flight_plan`.
         parameters: size and limits, with a narrow radius.
     """
-    position, target, viewpoint, goal = places
+    position, target = places[:2]
     reason = UNREACHABLE
     for margin in margins(position, target, space.voxels.resolution):
         window = window_around(space, (position, target), margin, parameters)
@@ -162,16 +163,7 @@ def make_plan_through_gaps(
         start = way_out(space, window, position, escape(position, parameters))
         if start is None:
             return FlightPlan(reason=NO_WAY_OUT)
-        end = None if goal is None else window.point(goal)
-        if end is None or window.is_blocked(end):
-            end = snap_goal(
-                space,
-                window,
-                target=target,
-                position=position,
-                viewpoint=viewpoint,
-                max_distance=parameters.snap_distance,
-            )
+        end = end_in(space, window, places, parameters)
         if end is None:
             return FlightPlan(reason=f"no free space within {parameters.snap_distance:g} m")
         plan = _through_gaps(space, window, wider, start, end, parameters)
