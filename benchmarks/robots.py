@@ -1,6 +1,7 @@
 """What the robots can do: simulated time per CPU second, tracking, and narrow doors.
 
-B1: whole episodes in the apartment without latency, rendering excluded, while the robot moves.
+B1: whole episodes in the apartment without latency, rendering excluded, while the robot moves; of
+several runs, see ``moving.speed``.
 B2, B3: seeded drives through a door of 1.35 times the robot's width, on a known map, with planner,
 controller, governor and physics; the paper's robots have no such figures.
 """
@@ -8,15 +9,14 @@ controller, governor and physics; the paper's robots have no such figures.
 from __future__ import annotations
 
 import argparse
-import statistics
 import tempfile
-from collections import Counter
 from pathlib import Path
 from unittest import mock
 
 import numpy as np
 from drives import Drive, seeded_drive
 from episode import Meter, chunked_simulator, metering, row
+from moving import Stretch, speed
 
 from unilavira_drake import episode, load_scenario, run_episode
 from unilavira_drake.robots.robot import GroundRobot
@@ -25,12 +25,12 @@ from unilavira_drake.scenario_loading import robot_setting
 
 RATIO = 1.35
 """Width of the door by that of the robot."""
-RUNS = 3
-"""Other load on a machine slows single runs by a third."""
+RUNS = 5
+"""Of each task; see ``moving.speed``."""
 
 
-def episode_seconds(name: str, task: str) -> tuple[Counter[str], bool]:
-    """Runs a task in the apartment; returns seconds by category, and whether it succeeded."""
+def moving_stretches(name: str, task: str) -> tuple[list[Stretch], bool]:
+    """Runs a task in the apartment; returns how it moved, and whether it succeeded."""
     meter = Meter()
     overlay = f"{{robot: {robot_setting(name)}, task: {{text: '@{task}'}}}}"
     with (
@@ -39,31 +39,31 @@ def episode_seconds(name: str, task: str) -> tuple[Counter[str], bool]:
         mock.patch.object(episode, "Simulator", chunked_simulator(meter)),
     ):
         result = run_episode(load_scenario("apartment", overlay), out=Path(folder) / "run")
-    return meter.seconds, bool(result.success)
+    return meter.moving, bool(result.success)
 
 
-def speed(name: str, robot: GroundRobot, tasks: list[str]) -> None:
-    """Prints B1 of a robot, the median of a few runs of all tasks."""
-    episode_seconds(name, tasks[0])  # Compiles the kernels and fills the caches.
-    runs = []
+def print_speed(name: str, robot: GroundRobot, tasks: list[str]) -> None:
+    """Prints B1 of a robot: all tasks, one after the other."""
+    moving_stretches(name, tasks[0])  # Compiles the kernels and fills the caches.
+    runs: list[list[Stretch]] = []
     successes = 0
     for _ in range(RUNS):
-        seconds: Counter[str] = Counter()
+        run: list[Stretch] = []
         for task in tasks:
-            more, success = episode_seconds(name, task)
-            seconds += more
+            stretches, success = moving_stretches(name, task)
+            run += stretches
             successes += success
-        runs.append(seconds)
-    ratios = [run["simulated_moving"] / run["moving"] for run in runs]
+        runs.append(run)
+    value, each = speed(runs)
     row(
         f"B1.{name}",
         "simulated seconds per CPU second while it moves, full agent, rendering excluded",
-        statistics.median(ratios),
+        value,
         "s/s",
         target=100 if robot.gait is None else 30,
         sense=">=",
-        runs=[round(ratio, 1) for ratio in ratios],
-        simulated_moving_s=round(runs[0]["simulated_moving"], 1),
+        runs=each,
+        simulated_moving_s=round(sum(seconds for seconds, _ in runs[0]), 1),
         successes=f"{successes}/{RUNS * len(tasks)}",
     )
 
@@ -120,7 +120,7 @@ def main() -> None:
     for name, kind in robot_kinds().items():
         robot = kind()
         if isinstance(robot, GroundRobot) and (wanted is None or name in wanted):
-            speed(name, robot, options.tasks.split(","))
+            print_speed(name, robot, options.tasks.split(","))
             doors(name, robot, options.drives)
 
 

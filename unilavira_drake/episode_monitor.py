@@ -21,7 +21,7 @@ from unilavira_drake.messages import (
 from unilavira_drake.messages.metrics import UNCOUNTED, UNREACHABLE, EpisodeMetrics
 from unilavira_drake.messages.people import PeopleTruth
 from unilavira_drake.mllm.usage import ModelUsage
-from unilavira_drake.ports import InputReader, Level, message_input, pose_input
+from unilavira_drake.ports import InputReader, Level, message_input, pose_input, pose_numbers
 from unilavira_drake.scenario import Budgets
 
 SHORTEST_STEP = 0.001
@@ -145,7 +145,7 @@ class EpisodeMonitor(Level):
         )
 
     def _follow_motion(self, context: Context, state: MonitorState, time: float) -> MonitorState:
-        X_WB: list[float] = self._pose(context).GetAsMatrix34().ravel().tolist()
+        X_WB = pose_numbers(self._pose(context))
         x, y, z = X_WB[3::4]
         yaw = math.atan2(X_WB[4], X_WB[0])
         metrics = state.metrics

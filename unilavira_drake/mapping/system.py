@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I
 
@@ -35,6 +36,7 @@ from unilavira_drake.ports import (
     pixels,
     pose_input,
     pose_matrix,
+    pose_numbers,
 )
 
 OLDEST_VIEW = 0.5
@@ -168,7 +170,10 @@ class OccupancyMapper(Level):
     def step(self, context: Context, state: Any) -> Any:
         """Returns the state after the newest panorama or depth image; see the class."""
         panorama = self._panorama(context)
-        X_WB = pose_matrix(self._pose(context))
+        pose = self._pose(context)
+        if panorama.n <= state.occupancy.n and not self._due(context.get_time(), state, pose):
+            return state
+        X_WB = pose_matrix(pose)
         if panorama.first > state.occupancy.n:
             oldest = context.get_time() - self._oldest
             frames = [frame for frame in panorama.frames if frame.time >= oldest]
@@ -179,10 +184,8 @@ class OccupancyMapper(Level):
         if panorama.n > state.occupancy.n:
             occupancy = dc.replace(state.occupancy, n=panorama.n)
             return dc.replace(state, occupancy=occupancy)
-        if not self._due(context.get_time(), state, X_WB):
-            return state
         image = self._depth_image(context)
-        X_WC = pose_matrix(self._pose(context) @ self._X_BC(context))
+        X_WC = pose_matrix(pose @ self._X_BC(context))
         view = DepthView(pixels(image)[:, :, 0], self._intrinsics, X_WC)
         corridor = self._corridor(context, state, X_WB)
         if corridor is not None:
@@ -212,14 +215,16 @@ class OccupancyMapper(Level):
         moving: NDArray[np.int16] = self._moves[labels]
         return moving
 
-    def _due(self, time: float, state: MapperState, X_WB: NDArray[np.float64]) -> bool:
+    def _due(self, time: float, state: MapperState, pose: RigidTransform) -> bool:
         if time - state.time >= self._rest_period - 1e-9:
             return True
-        if not np.isfinite(X_WB).all():
+        X_WB = pose_numbers(pose)
+        if not all(map(math.isfinite, X_WB)):
             return False
-        if math.hypot(*(X_WB[:2, 3] - state.position)) >= self._travel:
+        if math.dist((X_WB[3], X_WB[7]), state.position) >= self._travel:
             return True
-        return abs(math.remainder(_yaw(X_WB) - state.yaw, math.tau)) >= self._turn
+        yaw = math.atan2(X_WB[4], X_WB[0])
+        return abs(math.remainder(yaw - state.yaw, math.tau)) >= self._turn
 
     def _integrated(
         self,

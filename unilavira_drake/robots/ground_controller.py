@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from unilavira_drake.messages import Path, Sweep
-from unilavira_drake.ports import message_input, pose_input, vector_input
+from unilavira_drake.ports import message_input, pose_input, pose_numbers, vector_input
 from unilavira_drake.robots.drive_limits import DriveLimits, Reaction, approach
 from unilavira_drake.robots.ground_tracking import (
     back_off,
@@ -81,7 +81,7 @@ class GroundTrackingController(LeafSystem):
         sweep = self._sweep(context)
         follow = len(path.p_WP) > 0 and path.n >= sweep.n
         if follow or sweep.active:
-            X_WB: list[float] = self._pose(context).GetAsMatrix34().ravel().tolist()
+            X_WB = pose_numbers(self._pose(context))
             x, y, yaw = X_WB[3], X_WB[7], math.atan2(X_WB[4], X_WB[0])
             yaw_rate = float(self._twist(context)[2])
         if follow and path.backwards:

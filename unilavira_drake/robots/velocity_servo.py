@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
-
-from unilavira_drake.ports import vector_input
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import MatrixGain, Multiplexer, Saturation
 
 SAMPLES = (0.7, -1.9)
 """Places of the joints in which their inertia is compared, m or rad: at zero, coupled ones may look
@@ -96,8 +95,11 @@ def _constant_inertia(
     return found[0] if same else None
 
 
-class VelocityServo(LeafSystem):
+class VelocityServo(Diagram):
     """The force of each joint that brings it to its desired speed, within its effort.
+
+    It is evaluated in each step of the plant, so it is made of Drake's own Systems: no call of
+    Python's.
 
     .. pydrake_system::
 
@@ -117,20 +119,19 @@ class VelocityServo(LeafSystem):
 
     def __init__(self, gains: ServoGains) -> None:
         super().__init__()
+        count = len(gains.gain)
+        builder = DiagramBuilder()
+        states = builder.AddSystem(Multiplexer([2 * count, 2 * count]))
+        gain = np.diag(gains.gain)
+        zero = np.zeros_like(gain)
+        force_by_states: Any = np.hstack([zero, -gain, zero, gain])
+        missing = builder.AddSystem(MatrixGain(D=force_by_states))
+        effort: Any = gains.effort
+        bounded = builder.AddSystem(Saturation(min_value=-effort, max_value=effort))
+        builder.Connect(states.get_output_port(), missing.get_input_port())
+        builder.Connect(missing.get_output_port(), bounded.get_input_port())
+        builder.ExportInput(states.get_input_port(0), "joint_state")
+        builder.ExportInput(states.get_input_port(1), "desired_joint_state")
+        builder.ExportOutput(bounded.get_output_port(), "actuation")
+        builder.BuildInto(self)
         self.set_name("velocity_servo")
-        self._gains = list(zip(gains.gain.tolist(), gains.effort.tolist(), strict=True))
-        count = len(self._gains)
-        self._joint_state = vector_input(self, "joint_state", 2 * count)
-        self._desired = vector_input(self, "desired_joint_state", 2 * count)
-        self.DeclareVectorOutputPort("actuation", BasicVector(count), self._calc_actuation)
-
-    def _calc_actuation(self, context: Context, output: Any) -> None:
-        count = len(self._gains)
-        speeds = self._joint_state(context).tolist()[count:]
-        desired = self._desired(context).tolist()[count:]
-        output.SetFromVector(
-            [
-                min(max(gain * (wanted - v), -effort), effort)
-                for (gain, effort), v, wanted in zip(self._gains, speeds, desired, strict=True)
-            ]
-        )
