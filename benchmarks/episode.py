@@ -65,7 +65,10 @@ CALLBACKS = (
 
 
 class Meter:
-    """CPU seconds by category; a nested span is not counted in the one around it."""
+    """CPU seconds by category; a nested span is not counted in the one around it.
+
+    ``moving`` are the stretches in which the robot moved, without rendering.
+    """
 
     def __init__(self) -> None:
         self.seconds: Counter[str] = Counter()
