@@ -25,7 +25,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo
 
 from unilavira_drake import load_scenario, make_navigation_diagram
-from unilavira_drake.messages import LanguageAction, TodoList, VisionAction
+from unilavira_drake.messages import LanguageAction, Panorama, TodoList, VisionAction
 from unilavira_drake.raster import RasterCameraConfig, RasterView, add_raster_camera, suns_of
 from unilavira_drake.recording.message_log import MessageLog
 from unilavira_drake.station import make_navigation_station
@@ -150,6 +150,8 @@ class Story:
         self._todo = TodoList()
         self._action = LanguageAction()
         self._target = ""
+        self.ahead: NDArray[np.uint8] | None = None
+        """The front view of the latest panorama."""
 
     def listen(self, t: float, system: str, event: str, message: Any) -> None:
         """Takes a message of the ring."""
@@ -159,6 +161,8 @@ class Story:
             self._action, self._target = message, ""
         elif isinstance(message, VisionAction):
             self._target = message.target_desc
+        elif isinstance(message, Panorama):
+            self.ahead = message.frame("front").color
 
     def picture(self, camera: NDArray[np.uint8], time: float) -> Image.Image:
         """Returns one picture of the animation."""
@@ -181,8 +185,10 @@ class Story:
                     font(12),
                 )
                 y += 16
-        tool = f"{self._action.tool} {self._action.argument}".strip()
-        draw.text((452, 282), f"{self._action.n}. {tool}", INK, font(13, bold=True))
+        tool = f"{self._action.n}. {self._action.tool} {self._action.argument}".strip()
+        draw.text(
+            (452, 282), tool if self._action.n else "looking around", INK, font(13, bold=True)
+        )
         draw.text((452, 300), self._target[:44], PALE, font(12))
         draw.text((690, 310), f"{time:5.1f} s", PALE, font(11))
         return image
@@ -204,7 +210,10 @@ def animation(scenario_name: str, task: str) -> list[Image.Image]:
         context = station.GetMyContextFromRoot(simulator.get_context())
         image: Any = station.GetOutputPort("front.color_image").Eval(context)
         pictures.append(story.picture(np.array(image.data[:, :, :3]), time + STEP))
-    return pictures + pictures[-1:] * 6
+    # Its last look around ends at another side than that on which it arrived.
+    end = simulator.get_context().get_time()
+    assert story.ahead is not None
+    return pictures + [story.picture(story.ahead, end)] * 7
 
 
 def main() -> None:
