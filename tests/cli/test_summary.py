@@ -145,3 +145,15 @@ def test_without_another_task_the_scenarios_are_listed() -> None:
     result = EpisodeResult(task=TaskResult(name="a"))
     scenario = Scenario(tasks={"a": NamedTask()})
     assert next_commands(result, scenario, Path("out"))[2] == "unilavira scenarios"
+
+
+def test_a_model_that_is_away_is_checked_next() -> None:
+    result = EpisodeResult(cause="model_unreachable", model=ModelResult(reasoning="model"))
+    own, other = "openai:m@http://127.0.0.1:9/v1", "gemini-3.1-pro"
+    for vision, checked in ((own, (own,)), (other, (own, other)), ("cassette:c.jsonl", (own,))):
+        scenario = Scenario(language_model=own, vision_model=vision)
+        assert next_commands(result, scenario, Path("out")) == (
+            *(f"unilavira doctor --model {spec}" for spec in checked),
+            "unilavira report out",
+            "unilavira run --scenario out/scenario.yaml --model rules",
+        )

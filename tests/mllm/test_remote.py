@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import logging
 import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from typing import Any
 
 import pytest
-from fault_server import FaultServer
+from fault_server import FaultServer, answer
 from tiny_model import DECIDE, GROUND, model_of, profile_of
 from wire_faults import FAULTS
 
@@ -268,6 +270,40 @@ def test_an_outage_is_waited_for_as_long_as_patience_goes(
         model_of(short, http).complete(GROUND)
     assert time.monotonic() - begin < 2.0
     assert len(caught.value.attempts) > 3
+
+
+@DIALECTS
+def test_a_server_that_is_started_again_is_waited_for(dialect: str, http: HttpClient) -> None:
+    with HTTPServer(("127.0.0.1", 0), _Answering, bind_and_activate=False) as restarted:
+        restarted.server_bind()  # Bound, it refuses connections until it is activated.
+
+        class Watching(Breaker):
+            tries = 0
+
+            def failed(self, reason: str) -> None:
+                self.tries += 1
+                assert "refuses the connection" in reason
+                if self.tries == 5:
+                    restarted.server_activate()
+                    threading.Thread(target=restarted.handle_request, daemon=True).start()
+
+        url = f"http://127.0.0.1:{restarted.server_port}/{dialect}"
+        model = model_of(profile_of(dialect, url, outage_patience=20.0), http, breaker=Watching())
+        completion = model.complete(GROUND)
+    assert [row.status for row in completion.attempts] == ["MllmUnreachable"] * 5 + ["ok"]
+
+
+class _Answering(BaseHTTPRequestHandler):
+    def do_POST(self) -> None:
+        body = json.dumps(answer(self.path.split("/")[1], "{}")).encode()
+        self.rfile.read(int(self.headers["content-length"]))
+        self.send_response(200)
+        self.send_header("content-length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, *_: object) -> None:
+        pass
 
 
 def test_an_open_breaker_fails_at_once(server: FaultServer, http: HttpClient) -> None:

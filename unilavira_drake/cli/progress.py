@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
@@ -26,6 +28,35 @@ from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.task_choice import EpisodeTask
 
 _INDENT = " " * 5
+_TRIES = "unilavira_drake.mllm.remote_call"
+"""The logger of the failed tries."""
+
+
+class _LiveLine:
+    """The last line on a terminal; drawn many times a second, so that its wall time goes on."""
+
+    def __init__(self) -> None:
+        self.began = time.perf_counter()
+        self.doing = "building the world"
+        self.failed = ""
+        """The last failed try of a call under way."""
+
+    def __rich__(self) -> Text:
+        wall = time.perf_counter() - self.began
+        failed = f"; {self.failed}" if self.failed else ""
+        return Text(f"{self.doing}, wall {wall:.1f} s{failed}", no_wrap=True, overflow="ellipsis")
+
+
+class _FailedTries(logging.Handler):
+    """Passes on what the calls of remote models tell of themselves, from their threads."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        super().__init__(logging.INFO)
+        self._tell = tell
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Takes one failed try."""
+        self._tell(record.getMessage())
 
 
 class Progress:
@@ -34,15 +65,21 @@ class Progress:
     def __init__(self, console: Console | None = None) -> None:
         self.console = console or Console(highlight=False, soft_wrap=False)
         self._status: Status | None = None
-        self._began = time.perf_counter()
+        self._live = _LiveLine()
+        self._tries = _FailedTries(self._failed)
+        self._level = logging.NOTSET
         self._todo: tuple[TodoItem, ...] = ()
         self._mailboxes: dict[str, MailboxModel] = {}
 
     def __enter__(self) -> Progress:
         """Begins to measure wall time, and shows the live line on a terminal."""
-        self._began = time.perf_counter()
+        self._live.began = time.perf_counter()
+        tries = logging.getLogger(_TRIES)
+        self._level = tries.level
+        tries.setLevel(logging.INFO)
+        tries.addHandler(self._tries)
         if self.console.is_terminal:
-            self._status = self.console.status("building the world")
+            self._status = self.console.status(self._live)
             self._status.start()
         return self
 
@@ -53,6 +90,9 @@ class Progress:
         trace: TracebackType | None,
     ) -> None:
         """Ends the live line."""
+        tries = logging.getLogger(_TRIES)
+        tries.removeHandler(self._tries)
+        tries.setLevel(self._level)
         if self._status is not None:
             self._status.stop()
 
@@ -91,7 +131,7 @@ class Progress:
         self._now(t, message)
 
     def _decision(self, t: float, action: LanguageAction) -> None:
-        wall = time.perf_counter() - self._began
+        wall = time.perf_counter() - self._live.began
         what = f"{action.tool} {action.argument}".strip()
         self._line(
             f"{action.n:>3}. {action.call:<12} {what:<16} simulated {t:6.1f} s  wall {wall:5.1f} s",
@@ -124,12 +164,16 @@ class Progress:
             self.console.print(line, soft_wrap=True)
 
     def _now(self, t: float, message: Any) -> None:
-        if self._status is None:
-            return
+        if isinstance(message, LanguageAction | VisionAction):
+            self._live.failed = ""
         doing = _doing(message)
         if doing:
-            wall = time.perf_counter() - self._began
-            self._status.update(Text(f"{doing}  simulated {t:.1f} s, wall {wall:.1f} s"))
+            self._live.doing = f"{doing}  simulated {t:.1f} s"
+
+    def _failed(self, words: str) -> None:
+        self._live.failed = words
+        if self._status is None:
+            self._line(f"{_INDENT}{words}", "yellow")
 
 
 def _doing(message: Any) -> str:

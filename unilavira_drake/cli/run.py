@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
@@ -13,10 +14,11 @@ import typer
 from unilavira_drake.cli.progress import Progress
 from unilavira_drake.cli.summary import print_summary
 from unilavira_drake.episode import run_episode
-from unilavira_drake.errors import InfrastructureError, InputError
+from unilavira_drake.errors import InfrastructureError, InputError, MllmError
 from unilavira_drake.messages.metrics import CAUSES, UNCOUNTED, UNREACHABLE
-from unilavira_drake.mllm.backends import SPECS, make_backend
+from unilavira_drake.mllm.backends import SPECS, make_backend, profile_of
 from unilavira_drake.mllm.judges import make_judge
+from unilavira_drake.mllm.readiness import check_ready
 from unilavira_drake.recording.run_folder import fresh_folder
 from unilavira_drake.rendering_check import check_rendering
 from unilavira_drake.scenario import Scenario, robot_kinds
@@ -96,6 +98,7 @@ def run(
     choice = [] if robot is None else [f"robot={robot_setting(robot)}"]
     loaded = load_scenario(scenario, _overlay(flags, [*choice, *(setting or [])]))
     check_rendering(renderer=loaded.renderer)
+    check_models(loaded)
     if out is not None:
         run_watched(loaded, out)
         return
@@ -108,6 +111,26 @@ def run(
             folder.rmdir()
             folder.parent.rmdir()
         raise
+
+
+def check_models(scenario: Scenario) -> None:
+    """Returns if the endpoints of the two models can be asked, as far as that is seen at once.
+
+    Raises:
+        InfrastructureError: if a key is missing or nothing listens at an address; names the
+            command that tells more.
+    """
+    if scenario.record and scenario.record_mode != "record":
+        return  # The cassette to continue may hold every reply.
+    for role, spec in (("language", scenario.language_model), ("vision", scenario.vision_model)):
+        profile = profile_of(spec, place=f"{role}_model")
+        if profile is None:
+            continue
+        try:
+            check_ready(profile, role=role)
+        except MllmError as error:
+            doctor = f"unilavira doctor --model {shlex.quote(spec)}"
+            raise InfrastructureError(f"{role}_model: {error} To check it: {doctor}") from None
 
 
 def run_watched(scenario: Scenario, out: Path) -> None:

@@ -9,7 +9,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from unilavira_drake.messages.metrics import CAUSES
+from unilavira_drake.messages.metrics import CAUSES, UNREACHABLE
+from unilavira_drake.mllm.backends import profile_of
 from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.report.figures import cost_figures, judge_figures
 from unilavira_drake.scenario import Scenario
@@ -19,7 +20,7 @@ _VERDICTS = {True: "success", False: "no success", None: "not scored"}
 
 
 def print_summary(result: EpisodeResult, scenario: Scenario, out: Path, console: Console) -> None:
-    """Prints how an episode ended, its figures, its folder and three commands to try next."""
+    """Prints how an episode ended, its figures, its folder and commands to try next."""
     style = {True: "bold green", False: "bold red", None: "bold"}[result.success]
     console.print(f"\n{_VERDICTS[result.success]}: {result.cause}", style=style, markup=False)
     console.print(CAUSES.get(result.cause, ""), markup=False)
@@ -34,18 +35,31 @@ def print_summary(result: EpisodeResult, scenario: Scenario, out: Path, console:
         console.print(f"  {command}", markup=False, soft_wrap=True)
 
 
-def next_commands(result: EpisodeResult, scenario: Scenario, out: Path) -> tuple[str, str, str]:
-    """Returns three commands that a person would try after this episode of a scenario."""
+def next_commands(result: EpisodeResult, scenario: Scenario, out: Path) -> tuple[str, ...]:
+    """Returns the commands that a person would try after this episode of a scenario."""
     again = f"unilavira run --scenario {shlex.quote(str(out / 'scenario.yaml'))}"
     # A cassette has no replies to other prompts, and a real model costs money.
     rules = "" if result.model.reasoning == "rules" else " --model rules"
     other = rules or f" --ablation {'no_tdm' if result.ablation == 'full' else 'full'}"
     task = _next_task(scenario, result.task.name)
+    report = f"unilavira report {shlex.quote(str(out))}"
+    if result.cause == UNREACHABLE:
+        return (*_doctors(scenario), report, f"{again}{other}")
     return (
-        f"unilavira report {shlex.quote(str(out))}",
+        report,
         f"{again}{other}",
         f"{again} --task {shlex.quote('@' + task)}{rules}" if task else "unilavira scenarios",
     )
+
+
+def _doctors(scenario: Scenario) -> list[str]:
+    """One command for each endpoint; a cassette has none."""
+    specs = dict.fromkeys((scenario.language_model, scenario.vision_model))
+    return [
+        f"unilavira doctor --model {shlex.quote(spec)}"
+        for spec in specs
+        if profile_of(spec, place="--model") is not None
+    ]
 
 
 def _next_task(scenario: Scenario, name: str) -> str:

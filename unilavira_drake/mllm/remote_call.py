@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
+import logging
 import operator
 import time
 from dataclasses import dataclass
@@ -37,6 +38,9 @@ from unilavira_drake.mllm.retrying import CallClock, Retries, RetryPolicy, TryFa
 from unilavira_drake.mllm.structured_modes import step_down, structured_mode
 from unilavira_drake.mllm.tokens import estimated_tokens
 from unilavira_drake.mllm.wire import WireDialect, WireFailure, WireReply
+
+log = logging.getLogger(__name__)
+"""Tells of each failed try at once, for who watches; the ledger has it when the call has ended."""
 
 _BREAKER_SLICE = 1.0
 """Seconds between two looks at an open breaker, which another call may close."""
@@ -195,6 +199,7 @@ class RemoteCall:
             self._note("ok", status, usage, seconds, detail)
         else:
             self._note(outcome.error.__name__, status, usage, seconds, outcome.message)
+            log.info("try %d failed: %s", len(self._attempts), outcome.message)
         return outcome, status
 
     def _exchange(self, body: bytes) -> HttpResponse | WireFailure:
