@@ -35,7 +35,7 @@ from unilavira_drake.mllm.reply import Attempt
 from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.mllm.usage import ModelUsage
 from unilavira_drake.model_pair import ModelPair, make_models
-from unilavira_drake.recording.map_picture import map_picture
+from unilavira_drake.recording.map_picture import map_picture, stacked
 from unilavira_drake.recording.message_log import Listener, MessageLog
 from unilavira_drake.recording.result import EpisodeResult
 from unilavira_drake.recording.run_folder import RunFolder
@@ -167,17 +167,31 @@ def _verdict(
 def _map(
     world: World, trace: EpisodeTrace, episode: _Run, goal: GoalField | None, task: EpisodeTask
 ) -> bytes:
-    z = float(episode.output("station", "cheat_X_WB").translation()[2])
-    floor = world.storey_at(z)
-    goal = None if goal is None else goal.on(floor)
-    return map_picture(
-        world.storey(z),
-        trace.on(lambda height: world.storey_at(height) == floor),
-        episode.output("navigation", "map"),
-        goals=() if goal is None else goal.places,
-        goal_area=() if goal is None else success_area(goal, task.rule),
-        title=task.spec.text,
-    )
+    """One panel for each storey that the robot was on, in the order of its first visits."""
+    last = world.storey_at(float(episode.output("station", "cheat_X_WB").translation()[2]))
+    floors = list(dict.fromkeys([*map(world.storey_at, trace.heights), last]))
+    panels = []
+    for floor in floors:
+        part = _part_on(floor, world, trace)
+        known = part.maps[max(part.maps)] if part.maps else None
+        here = None if goal is None else goal.on(floor)
+        number = f"Storey {world.elevations.index(floor) + 1} of {len(world.elevations)}."
+        title = task.spec.text if floor == floors[0] else ""
+        panels.append(
+            map_picture(
+                world.storey(floor),
+                part,
+                episode.output("navigation", "map") if floor == last else known,
+                goals=() if here is None else here.places,
+                goal_area=() if here is None else success_area(here, task.rule),
+                title=title if len(floors) == 1 else f"{number} {title}",
+            )
+        )
+    return stacked(panels)
+
+
+def _part_on(floor: float, world: World, trace: EpisodeTrace) -> EpisodeTrace:
+    return trace.on(lambda height: world.storey_at(height) == floor)
 
 
 class _Run:

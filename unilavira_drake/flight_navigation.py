@@ -113,6 +113,8 @@ def _add_mapper_and_planner(
             travel=flight.travel,
             turn=math.radians(flight.turn_degrees),
             rest_period=flight.rest_period,
+            min_altitude=flight.min_altitude,
+            max_altitude=flight.max_altitude,
             period=tick,
         ),
     )

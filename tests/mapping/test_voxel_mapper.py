@@ -149,7 +149,14 @@ def test_a_cloned_context_has_the_same_future(ray_cast):
 
 
 def test_alone_it_maps_what_a_panorama_shows(ray_cast):
-    mapper = VoxelMapper(intrinsics={}, resolution=0.3, max_range=8.0, stride=1)
+    mapper = VoxelMapper(
+        intrinsics={},
+        resolution=0.3,
+        max_range=8.0,
+        stride=1,
+        min_altitude=0.5,
+        max_altitude=9.0,
+    )
     context = mapper.CreateDefaultContext()
     mapper.GetInputPort("pose_estimate").FixValue(context, Value[RigidTransform](pose()))
     mapper.GetInputPort("panorama").FixValue(
@@ -159,6 +166,7 @@ def test_alone_it_maps_what_a_panorama_shows(ray_cast):
     simulator.AdvanceTo(3.0)
     voxels = mapper.GetOutputPort("voxel_map").Eval(context)
     assert (voxels.n, voxels.version) == (3, 1)
+    assert voxels.altitudes == (0.5, 9.0)
     assert (voxels.window((13, -1, 2), (14, 1, 6)) > 0).all()
 
 

@@ -15,7 +15,7 @@ from unilavira_drake.messages import (
 )
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
-from unilavira_drake.recording.map_picture import map_picture
+from unilavira_drake.recording.map_picture import map_picture, stacked
 from unilavira_drake.recording.trace import EpisodeTrace
 from unilavira_drake.worlds.world import Box, Room, World, WorldObject
 
@@ -93,7 +93,27 @@ def test_what_lies_on_another_floor_is_told_from_the_way() -> None:
     assert upper.ends[1] == trace.ends[1] == (5.0, 1.0, 0.0)
     assert lower.ends == ((1.0, 1.0, 0.0), None)
     assert np.array_equal(upper.points, trace.points)
-    assert map_picture(WORLD, upper) != map_picture(WORLD, trace)
+    panels = [map_picture(WORLD, part) for part in (lower, upper)]
+    assert panels[1] != map_picture(WORLD, trace)
+    assert trace.heights[0] == 0.0
+    assert trace.heights[-1] == 2.8
+    images = [
+        cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+        for png in (stacked(panels), *panels)
+    ]
+    assert np.array_equal(images[0], np.vstack(images[1:]))
+    assert stacked(panels[:1]) is panels[0]
+
+
+def test_each_floor_keeps_the_maps_that_were_made_on_it() -> None:
+    trace = EpisodeTrace()
+    for n, z in enumerate([0.0, 0.0, 2.8], start=1):
+        X_WB = pose(1.0, 1.0)
+        X_WB[2, 3] = z
+        trace.record(float(n), "", "", Panorama(n=n, X_WB=X_WB))
+        trace.record(float(n), "", "", OccupancyMap(n=n))
+    assert list(trace.on(lambda z: z < 2.5).maps) == [1, 2]
+    assert list(trace.on(lambda z: z > 2.5).maps) == [3]
 
 
 def test_the_picture_is_a_png_of_the_same_bytes_each_time() -> None:

@@ -65,6 +65,8 @@ class VoxelMapper(Level):
         travel: metres between two integrations.
         turn: radians between two integrations, about any axis.
         rest_period: seconds between two integrations at rest.
+        min_altitude: lowest z of the aircraft's centre in the world, metres; the map tells it.
+        max_altitude: highest z of its centre in the world, metres; the map tells it.
         period: seconds between two polls.
 
     Raises:
@@ -83,9 +85,11 @@ class VoxelMapper(Level):
         travel: float = 0.5,
         turn: float = math.radians(15.0),
         rest_period: float = 2.0,
+        min_altitude: float = 1.0,
+        max_altitude: float = 60.0,
         period: float = 0.1,
     ) -> None:
-        empty = VoxelMap(resolution=resolution)
+        empty = VoxelMap(resolution=resolution, altitudes=(min_altitude, max_altitude))
         super().__init__(VoxelMapperState(empty), period=period)
         self._parameters = VoxelParameters(
             resolution=resolution,

@@ -83,7 +83,8 @@ def integrate_voxels(
             rejected.append(f"view {number}: {fault}")
         elif _integrate_view(tiles, view, parameters):
             seen = True
-    return VoxelMap(
+    return dc.replace(
+        voxels,
         n=n,
         version=voxels.version + 1,
         time=time if seen else voxels.time,

@@ -31,7 +31,7 @@ class VoxelMap(Message):
     unknown.  A map made from another shares all tiles that did not change.
 
     Raises:
-        ValueError: if a tile has another shape or type, or the resolution makes no sense.
+        ValueError: if a tile has another shape or type, or resolution or altitudes make no sense.
     """
 
     n: int = 0
@@ -44,10 +44,15 @@ class VoxelMap(Message):
     """(32, 32, 32) int8 of each tile, indexed [x, y, z]."""
     rejected: tuple[str, ...] = ()
     """Why views of the latest integration were left out, one reason each."""
+    altitudes: tuple[float, float] = (-math.inf, math.inf)
+    """Lowest and highest z at which its aircraft flies, metres: between them things are in the way,
+    below is ground, above are ceilings."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.resolution < math.inf:
             raise ValueError(f"the resolution must be positive, not {self.resolution}")
+        if not self.altitudes[0] < self.altitudes[1]:
+            raise ValueError(f"the lowest altitude must be below the highest, not {self.altitudes}")
         for key, tile in self.tiles.items():
             if tile.shape != (TILE, TILE, TILE) or tile.dtype != np.int8:
                 raise ValueError(f"tile {key} must be {TILE} x {TILE} x {TILE} of int8")
@@ -56,7 +61,7 @@ class VoxelMap(Message):
 
     def __reduce__(self) -> tuple[Any, ...]:
         fields = (self.n, self.version, self.time, self.resolution, dict(self.tiles), self.rejected)
-        return VoxelMap, fields
+        return VoxelMap, (*fields, self.altitudes)
 
     def voxel(self, p_WP: tuple[float, float, float]) -> tuple[int, int, int]:
         """Returns the voxel of a world point, metres."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -84,6 +86,20 @@ def map_picture(
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()
+
+
+def stacked(pictures: Sequence[bytes]) -> bytes:
+    """Returns pictures of the same width one above the other, the first on top, as PNG.
+
+    One alone is returned as it is.
+    """
+    if len(pictures) == 1:
+        return pictures[0]
+    panels = [
+        cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR) for picture in pictures
+    ]
+    _, png = cv2.imencode(".png", np.vstack([panel for panel in panels if panel is not None]))
+    return bytes(png)
 
 
 def _canvas(plan: FloorPlan, title_lines: int) -> tuple[Figure, Axes, float]:

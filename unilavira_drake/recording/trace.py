@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from unilavira_drake.messages import Goal, LanguageAction, NavigationStatus, Panorama
+from unilavira_drake.messages import (
+    Goal,
+    LanguageAction,
+    NavigationStatus,
+    OccupancyMap,
+    Panorama,
+)
 from unilavira_drake.messages.metrics import EpisodeMetrics
 from unilavira_drake.mllm.request import LanguageVariables, MllmRequest
 
@@ -35,6 +41,8 @@ class EpisodeTrace:
         """Waypoint -> (x, y), metres in the world."""
         self.goals: list[tuple[float, float]] = []
         """The points that the agent chose to go to, metres in the world."""
+        self.maps: dict[int, OccupancyMap] = {}
+        """Panorama -> the first map that holds it."""
         self.away: tuple[tuple[float, float], ...] = ()
         """When it was not on the floor that is shown, from and to, simulated seconds."""
 
@@ -42,6 +50,11 @@ class EpisodeTrace:
     def points(self) -> NDArray[np.float64]:
         """(k, 3) float64: simulated seconds, x and y in metres in the world."""
         return np.array(self._points, dtype=float).reshape(-1, 4)[:, :3]
+
+    @property
+    def heights(self) -> tuple[float, ...]:
+        """The height of each point, metres in the world."""
+        return tuple(z for _, _, _, z in self._points)
 
     @property
     def backtracks(self) -> tuple[tuple[float, float], ...]:
@@ -84,6 +97,7 @@ class EpisodeTrace:
         }
         aims = zip(self.goals, self._goal_heights, strict=True)
         part.goals = [goal for goal, height in aims if shown(height)]
+        part.maps = {n: known for n, known in self.maps.items() if shown(self.height(n))}
         spans: list[tuple[float, float]] = []
         before = True
         for t, _, _, z in self._points:
@@ -107,13 +121,18 @@ class EpisodeTrace:
             self._departures[message.n] = t
             if message.tool == "backtrack":
                 self._backtracks.append(message.n)
+        elif isinstance(message, OccupancyMap):
+            self.maps[message.n] = message
         elif isinstance(message, Goal):
-            if message.kind == "go" and message.p_WG is not None:
-                self.goals.append(message.p_WG[:2])
-                self._goal_heights.append(message.p_WG[2])
+            self._keep_goal(message)
         elif isinstance(message, NavigationStatus):
             if message.terminal and message.n in self._departures:
                 self.legs[message.n] = (self._departures[message.n], t)
+
+    def _keep_goal(self, goal: Goal) -> None:
+        if goal.kind == "go" and goal.p_WG is not None:
+            self.goals.append(goal.p_WG[:2])
+            self._goal_heights.append(goal.p_WG[2])
 
     def _place_waypoint(self, request: MllmRequest) -> None:
         if isinstance(request.variables, LanguageVariables) and request.n in self.poses:

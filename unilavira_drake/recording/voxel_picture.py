@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from unilavira_drake.messages import OccupancyMap, VoxelMap
 from unilavira_drake.messages.voxels import TILE
-
-STANDING = 2.0
-"""What rises so far above the lowest thing in its tile column counts as an obstacle, metres."""
 
 
 def top_view(voxels: VoxelMap) -> OccupancyMap:
     """Returns what stands in the way and what is free, cell by cell, as seen from above.
 
-    A column is occupied where something rises ``STANDING`` above the lowest occupied voxel of the
-    32 x 32 columns around it, which is the ground as far as it was seen; it is free where something
-    else is known.  Log-odds are -1, 0 and 1.
+    A column is occupied where a voxel that reaches between the lowest and the highest altitude of
+    the aircraft is occupied.  Otherwise it is free where anything up to the highest is known: the
+    ground is no obstacle, and a ceiling alone says nothing of the room below it.  Log-odds are
+    -1, 0 and 1.
     """
     if not voxels.tiles:
         return OccupancyMap(voxels.n, voxels.version, voxels.time, voxels.resolution)
@@ -36,15 +35,17 @@ def top_view(voxels: VoxelMap) -> OccupancyMap:
     )  # fmt: skip
 
 
-def _column(voxels: VoxelMap, a: int, b: int, stack: list[int]) -> np.ndarray:
+def _column(voxels: VoxelMap, a: int, b: int, stack: list[int]) -> NDArray[np.int8]:
     """Returns (32, 32) int8 of one stack of tiles, indexed [x, y]."""
-    tiles = [voxels.tiles[a, b, c] for c in stack]
-    bottoms = np.concatenate([np.arange(c * TILE, (c + 1) * TILE) for c in stack])
-    occupied = np.concatenate([tile > 0 for tile in tiles], axis=2)
-    known = np.any([np.any(tile != 0, axis=2) for tile in tiles], axis=0)
-    levels = np.flatnonzero(occupied.any(axis=(0, 1)))
-    view = np.where(known, -1, 0).astype(np.int8)
-    if len(levels):
-        standing = bottoms >= bottoms[levels[0]] + STANDING / voxels.resolution
-        view[np.any(occupied & standing, axis=2)] = 1
+    lowest, highest = (altitude / voxels.resolution for altitude in voxels.altitudes)
+    view = np.zeros((TILE, TILE), np.int8)
+    for c in stack:
+        tile = voxels.tiles[a, b, c]
+        bottoms = np.arange(c * TILE, (c + 1) * TILE)
+        # A voxel that only touches a limit is beyond it, whatever the rounding.
+        flown = bottoms < highest - 1e-6
+        ground = bottoms + 1 < lowest + 1e-6
+        known = np.any((tile != 0) & flown, axis=2)
+        view[known & (view == 0)] = -1
+        view[np.any((tile > 0) & flown & ~ground, axis=2)] = 1
     return view
