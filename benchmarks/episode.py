@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+from chosen import names_among
 from moving import Stretch, speed
 from pydrake.multibody.plant import AddMultibodyPlant
 from pydrake.systems.analysis import Simulator, SimulatorStatus
@@ -249,8 +250,13 @@ def row(id_: str, what: str, value: float, unit: str, **more: Any) -> None:
 def main() -> None:
     """Runs the tasks and prints the rows."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tasks", default="fridge,bathtub,sofa", help="named tasks of flat")
-    tasks = parser.parse_args().tasks.split(",")
+    parser.add_argument(
+        "--tasks",
+        type=names_among("task", load_scenario("flat").tasks),
+        default="fridge,bathtub,sofa",
+        help="named tasks of flat",
+    )
+    tasks = parser.parse_args().tasks
     run(tasks[0], systems=False)  # Compiles the kernels and fills the caches.
     bare: Counter[str] = Counter()
     split: Counter[str] = Counter()

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from chosen import names_among
 
 from unilavira_drake import load_scenario, run_episode
 from unilavira_drake.errors import TaskError
@@ -114,7 +115,7 @@ def start_of(scenario: Scenario, task: str, seed: int) -> str:
     return text
 
 
-def tasks_of(family: str, chosen: Sequence[str]) -> list[tuple[str, str]]:
+def tasks_of(family: str, chosen: Sequence[str] = ()) -> list[tuple[str, str]]:
     """Returns (scenario, task) of a family; of all its tasks when none are chosen."""
     found = []
     for name in FAMILY_SCENARIOS[family]:
@@ -220,24 +221,20 @@ def blind_row() -> dict[str, Any]:
 
 
 def parsed() -> argparse.Namespace:
-    def names(text: str) -> list[str]:
-        return [name for name in text.split(",") if name]
-
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--model", default="rules", help="SPEC of both models")
     parser.add_argument("--judge", default="", help="SPEC of the judge of answers; default: none")
-    parser.add_argument("--family", type=names, default=list(FAMILY_SCENARIOS))
-    parser.add_argument("--tasks", type=names, default=[], help="named tasks; default: all")
+    families = names_among("family", FAMILY_SCENARIOS)
+    parser.add_argument("--family", type=families, default=list(FAMILY_SCENARIOS))
+    tasks = names_among(
+        "task", [task for family in FAMILY_SCENARIOS for _, task in tasks_of(family)]
+    )
+    parser.add_argument("--tasks", type=tasks, default=[], help="named tasks; default: all")
     parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--wirings", type=names, default=list(ABLATIONS))
+    parser.add_argument("--wirings", type=names_among("wiring", ABLATIONS), default=list(ABLATIONS))
     parser.add_argument("--pairs", type=int, default=12, help="pairs of each wiring, at least")
     parser.add_argument("--workers", type=int, default=max(1, (os.cpu_count() or 2) - 1))
-    options = parser.parse_args()
-    for given, valid in ((options.family, FAMILY_SCENARIOS), (options.wirings, ABLATIONS)):
-        for name in given:
-            if name not in valid:
-                parser.error(f"{name!r} is none of {', '.join(valid)}")
-    return options
+    return parser.parse_args()
 
 
 def main() -> None:

@@ -31,6 +31,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from chosen import names_among
 from cost import cpu_ms, resident_mb
 from numpy.typing import NDArray
 from PIL import Image
@@ -263,7 +264,12 @@ def concurrency(calls: int, latency: float) -> None:
 def main() -> None:
     """Prints the rows."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--only", default="L1,L2,L3", help="which rows")
+    parser.add_argument(
+        "--only",
+        type=names_among("row", ("L1", "L2", "L3")),
+        default="L1,L2,L3",
+        help="which rows, of L1,L2,L3; default: all",
+    )
     parser.add_argument("--calls", type=int, default=40, help="calls at the same time (L3)")
     parser.add_argument("--latency", type=float, default=40.0, help="of the server (L3), seconds")
     parser.add_argument("--serve", type=float, help=argparse.SUPPRESS)
@@ -271,12 +277,13 @@ def main() -> None:
     if arguments.serve is not None:
         asyncio.run(serve(arguments.serve))
         return
-    chosen = arguments.only.split(",")
-    if "L1" in chosen:
+    if not arguments.only:
+        parser.error("argument --only: name a row")
+    if "L1" in arguments.only:
         assembly()
-    if "L2" in chosen:
+    if "L2" in arguments.only:
         token_rows(row)
-    if "L3" in chosen:
+    if "L3" in arguments.only:
         concurrency(arguments.calls, arguments.latency)
 
 

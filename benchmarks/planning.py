@@ -32,6 +32,7 @@ from unittest import mock
 
 import numpy as np
 import skfmm
+from chosen import names_among
 from cost import cpu_ms
 from numpy.typing import NDArray
 from planning_peers import UNIT, blocked_hops, exact_geodesic, floor_plan
@@ -353,7 +354,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tasks", type=int, default=10, help="fields on each of three floors")
     parser.add_argument("--worlds", type=int, default=200, help="floors for paths; 0 for none")
-    parser.add_argument("--episodes", default=EPISODES, help="tasks of apartment; empty for none")
+    tasks = names_among("task", load_scenario("apartment").tasks)
+    parser.add_argument(
+        "--episodes", type=tasks, default=EPISODES, help="tasks of apartment; empty for none"
+    )
     arguments = parser.parse_args()
     warm_up()
     if arguments.tasks:
@@ -361,7 +365,7 @@ def main() -> None:
     if arguments.worlds:
         paths(arguments.worlds)
     if arguments.episodes:
-        episodes(arguments.episodes.split(","))
+        episodes(arguments.episodes)
 
 
 if __name__ == "__main__":

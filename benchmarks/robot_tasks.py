@@ -1,6 +1,9 @@
-"""Tasks carried out by each robot with the model ``rules``: routes, directives, stairs, people.
+"""Tasks carried out by each robot with the model ``rules``: routes, rooms, storeys, people.
 
     python benchmarks/robot_tasks.py [--seeds 5] [--only route,town,rooms,storeys,people]
+
+``route`` is to the refrigerator by each robot on the ground, ``town`` directives from the air,
+``rooms`` a flight indoors, ``storeys`` over the stairs, ``people`` past somebody who walks about.
 
 Prints one JSON object a line: a row for each episode, then one for each group.  ``rules`` reads
 the simulator's labels: these figures show that the robots work, and say nothing about multimodal
@@ -13,6 +16,8 @@ import argparse
 import json
 import statistics
 from collections.abc import Iterator
+
+from chosen import names_among
 
 from unilavira_drake import load_scenario, run_episode
 from unilavira_drake.scenario_loading import robot_setting
@@ -61,10 +66,16 @@ def main() -> None:
     """Prints the rows."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--only", default="", help="names of groups; all of them when empty")
+    known = tuple(groups(0))
+    parser.add_argument(
+        "--only",
+        type=names_among("group", known),
+        default=[],
+        help=f"groups, of {','.join(known)}; default: all",
+    )
     arguments = parser.parse_args()
     for name, episodes in groups(arguments.seeds).items():
-        if arguments.only and name not in arguments.only.split(","):
+        if arguments.only and name not in arguments.only:
             continue
         found = []
         for row in rows(episodes):

@@ -14,6 +14,7 @@ from pathlib import Path
 from unittest import mock
 
 import numpy as np
+from chosen import names_among
 from drives import Drive, seeded_drive
 from episode import Meter, chunked_simulator, metering, row
 from kept_pictures import KeptPictures
@@ -114,15 +115,23 @@ def doors(name: str, robot: GroundRobot, count: int) -> None:
 def main() -> None:
     """Measures the robots and prints the rows."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--robots", default="", help="names; default: all on the ground")
-    parser.add_argument("--tasks", default="fridge,bathtub", help="named tasks of the apartment")
+    ground = {name: kind for name, kind in robot_kinds().items() if issubclass(kind, GroundRobot)}
+    tasks = names_among("task", load_scenario("apartment").tasks)
+    parser.add_argument(
+        "--robots",
+        type=names_among("robot on the ground", ground),
+        default=[],
+        help=f"of {','.join(ground)}; default: all",
+    )
+    parser.add_argument(
+        "--tasks", type=tasks, default="fridge,bathtub", help="named tasks of the apartment"
+    )
     parser.add_argument("--drives", type=int, default=100, help="of each robot")
     options = parser.parse_args()
-    wanted = options.robots.split(",") if options.robots else None
-    for name, kind in robot_kinds().items():
-        robot = kind()
-        if isinstance(robot, GroundRobot) and (wanted is None or name in wanted):
-            print_speed(name, robot, options.tasks.split(","))
+    for name, kind in ground.items():
+        if not options.robots or name in options.robots:
+            robot = kind()
+            print_speed(name, robot, options.tasks)
             doors(name, robot, options.drives)
 
 

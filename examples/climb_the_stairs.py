@@ -52,3 +52,4 @@ if __name__ == "__main__":
     axes[2].set(aspect="equal", title="the way over the steps, m")
     figure.savefig("two_storey_map.png", dpi=120)
     print(f"{result.cause}; success: {result.success}; {result.metrics.path_length_m:.1f} m")
+    print("see two_storey_map.png")

@@ -1,7 +1,7 @@
 """Mapping without an agent: ``OccupancyMapper`` in one's own Diagram, from frontier to frontier."""
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.pyplot import subplots
 from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -42,19 +42,19 @@ if __name__ == "__main__":
     size = {"radius": robot.radius, "turning_radius": robot.turning_radius}
     grid, goal = make_navigation_grid(seen, position=stops[0], targets=(), **size), (17.4, 1.2)
     times = distance_field(grid.blocked, np.array([grid.cell(*goal)]), slowness=grid.slowness)
-    cells = extract_path(times, grid.blocked, grid.slowness, grid.point(*stops[0]))
-    way = cells * grid.resolution + grid.origin
-    figure, axes = plt.subplots(1, 2, figsize=(14, 4.3), layout="tight", subplot_kw={"fc": "0.9"})
+    way = extract_path(times, grid.blocked, grid.slowness, grid.point(*stops[0]))
+    way = way * grid.resolution + grid.origin
+    figure, axes = subplots(1, 2, figsize=(14, 5), layout="constrained", subplot_kw={"fc": "0.9"})
     for one, count in zip(axes, (3, len(stops)), strict=True):
         draw_occupancy(one, looks[count - 1][0])
-        one.plot(*np.transpose(stops[:count]), "o", color="black", mec="white", zorder=4)
-        one.set(xlim=(-0.2, 18.6), ylim=(-0.2, 11.6), aspect="equal", title=f"{count} looks around")
+        one.set(xlim=(-0.2, 18.6), ylim=(-0.2, 11.6), aspect="equal", xlabel="x, m", ylabel="y, m")
+        one.plot(*np.transpose(stops[:count]), "ko", mec="w", zorder=4, label=f"{count} looks")
     for frontier in looks[2][1].values():
-        axes[0].plot(*frontier.p_WF.T, "s", ms=2.5, label=f"{frontier.size:.1f} m")
-    axes[0].legend(title="frontiers", markerscale=3, loc="right")
+        axes[0].plot(*frontier.p_WF.T, "s", ms=2.5, label=f"frontier of {frontier.size:.1f} m")
     field = np.ma.masked_where(grid.blocked | (grid.log_odds >= 0), times * grid.resolution)
     x, y = (grid.origin[k] + grid.resolution * np.arange(times.shape[1 - k] + 1) for k in (0, 1))
-    axes[1].plot(*way.T, color="white", lw=2.5, zorder=3)
+    axes[1].plot(*way.T, "w*-", mfc="r", ms=17, markevery=[-1], zorder=3, label="way to the goal")
     figure.colorbar(axes[1].pcolormesh(x, y, field, zorder=2), label="weighted way to the goal, m")
+    axes[0].legend(loc="right"), axes[1].legend(loc=(0.2, -0.23), ncols=2, facecolor="0.6")
     figure.savefig("apartment_map.png", dpi=120)
-    print(f"{len(stops)} looks around; a way of {length(way):.1f} m")
+    print(f"{len(stops)} looks around; a way of {length(way):.1f} m; see apartment_map.png")

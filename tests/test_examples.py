@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-EXAMPLES = sorted((Path(__file__).resolve().parents[1] / "examples").glob("*.py"))
+ROOT = Path(__file__).resolve().parents[1]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+IGNORED = ROOT / ".gitignore"
 
 
 def test_there_are_examples() -> None:
@@ -23,6 +26,20 @@ def test_example_runs(path: Path, tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout.strip()
+    for picture in tmp_path.glob("*.png"):
+        assert picture.name in done.stdout
+        assert f"/{picture.name}" in IGNORED.read_text(encoding="utf-8").splitlines()
+    if path.stem == "people_cross":
+        check_nobody_is_touched(done.stdout)
+
+
+def check_nobody_is_touched(said: str) -> None:
+    words = r"stood ([\d.]+) s, drove ([\d.]+) m;.*\nnearest ([\d.]+) m, touched: (\w+)"
+    ((stood, driven, nearest, touched),) = re.findall(words, said)
+    assert float(stood) >= 1.0
+    assert float(driven) >= 7.0
+    assert float(nearest) >= 0.2
+    assert touched == "False"
 
 
 def test_the_first_example_has_ten_lines() -> None:

@@ -6,6 +6,8 @@ is an error, and overlays change single values.  Every flag of the command is su
 
 import copy
 import dataclasses as dc
+import functools
+import operator
 import typing
 
 from pydrake.multibody.plant import MultibodyPlantConfig
@@ -28,6 +30,7 @@ from unilavira_drake.robots.flight_config import FlightConfig
 from unilavira_drake.robots.localization_config import PoseEstimateConfig
 from unilavira_drake.robots.quadrotor import Quadrotor
 from unilavira_drake.robots.robot import Robot
+from unilavira_drake.robots.robot_class import check_robot_class, same_class
 from unilavira_drake.robots.unitree_g1 import UnitreeG1
 from unilavira_drake.robots.unitree_go1 import UnitreeGo1
 from unilavira_drake.sensors.exposure_config import ExposureConfig
@@ -186,12 +189,20 @@ def plant_config(scenario: Scenario) -> MultibodyPlantConfig:
 def register_robot(kind: type[Robot]) -> None:
     """Makes a robot of one's own a choice in scenarios; its tag is the name of the class.
 
+    A class that is registered again, as it is or after a reload of its module, takes its own place.
+
     Args:
-        kind: a dataclass whose fields all have defaults.
+        kind: a dataclass whose fields all have defaults; tag and ``name`` are no other robot's.
+
+    Raises:
+        ScenarioError: names place, value and remedy where scenarios could not use it.
     """
     field = Scenario.__dataclass_fields__["robot"]
-    if kind not in robot_kinds().values():
-        field.type = typing.cast(type, field.type | kind)
+    kinds = typing.get_args(field.type)
+    check_robot_class(kind, kinds)
+    kept = [kind if same_class(other, kind) else other for other in kinds]
+    choice = functools.reduce(operator.or_, kept if kind in kept else [*kept, kind])
+    field.type = typing.cast(type, choice)
 
 
 def robot_kinds() -> dict[str, type[Robot]]:
