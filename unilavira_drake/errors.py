@@ -136,6 +136,9 @@ def unknown_name(kind: str, name: str, valid: Iterable[str], place: str) -> str:
     """
     names = sorted(valid)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    if not near and len(name) > 1:
+        longer = [valid_name for valid_name in names if name.casefold() in valid_name.casefold()]
+        near = difflib.get_close_matches(name, longer, n=1, cutoff=0.0)
     remedy = f"did you mean {near[0]!r}? " if near else ""
     rest = ""
     if len(names) > MOST_NAMES:

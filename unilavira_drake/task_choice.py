@@ -44,9 +44,14 @@ def choose_task(scenario: Scenario) -> EpisodeTask:
     text = choice.text
     if not text:
         if not scenario.default_task:
+            if not scenario.tasks:
+                raise ScenarioError(
+                    "scenario.task: no task was given, and the scenario names none; pass --task, "
+                    "or give the sentence as task.text."
+                )
             raise ScenarioError(
                 "scenario.default_task: empty, and no task was given; set it to one of: "
-                f"{', '.join(sorted(scenario.tasks)) or 'none'}, or pass --task."
+                f"{', '.join(sorted(scenario.tasks))}, or pass --task."
             )
         text = f"@{scenario.default_task}"
     name = _named(scenario, text)

@@ -23,6 +23,8 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (["--scenario", "flta"], ["unknown scenario 'flta'", "did you mean 'flat'"]),
         (["--scenario", "none.yaml"], ["no file 'none.yaml'"]),
         (["--robot", "cobot"], ["unknown robot 'cobot'", "did you mean 'cobot_magic'"]),
+        (["--robot", "go1"], ["unknown robot 'go1'", "did you mean 'unitree_go1'"]),
+        (["--model", "cassette:nope"], ["unilavira: language_model: unknown cassette"]),
         (["--model", "ruels"], ["'ruels'", "did you mean 'rules'"]),
         (["--model", "rules:wild"], ["wild"]),
         (["--language-model", "gpt"], ["language_model", "'gpt'"]),
@@ -80,6 +82,29 @@ def test_a_scenario_file_s_mistake_is_told_with_its_line(
     assert main(["run", "--scenario", "mine.yaml"]) == 2
     message = " ".join(capsys.readouterr().err.split())
     assert "mine.yaml, line 2: budgets.decisions: expected a whole number, got 'few'" in message
+
+
+@pytest.mark.parametrize("text", ["", "world: {name: flat}\n"])
+def test_a_scenario_without_tasks_asks_for_one(
+    text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("mine.yaml").write_text(text)
+    assert main(["run", "--scenario", "mine.yaml"]) == 2
+    message = " ".join(capsys.readouterr().err.split())
+    assert "no task was given, and the scenario names none" in message
+    assert "--task" in message
+    assert "task.text" in message
+    assert "set it to one of" not in message
+
+
+@pytest.mark.parametrize("goal", ["kitchn", "99,99", "fridge_9"])
+def test_a_goal_is_checked_before_anything_is_said_of_it(
+    goal: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "--task", "Go.", "--goal", goal]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "goal" in captured.err
 
 
 def test_an_unknown_command_is_told(capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,7 +14,7 @@ from unilavira_drake.cli.main import main
 from unilavira_drake.cli.progress import Progress
 from unilavira_drake.errors import RenderingError
 from unilavira_drake.messages import LanguageAction, NavigationStatus, TodoItem, TodoList
-from unilavira_drake.recording.result import result_from_json
+from unilavira_drake.recording.result import installed_versions, result_from_json
 from unilavira_drake.scenario_loading import load_scenario
 
 
@@ -131,6 +131,38 @@ def test_the_list_is_printed_when_it_changes() -> None:
         "! item 2 stays open",
         "failed: stuck",
     ]
+
+
+def test_the_columns_of_decisions_hold_whatever_is_decided() -> None:
+    stream = io.StringIO()
+    progress = Progress(Console(file=stream, width=120))
+    actions = (
+        LanguageAction(1, "decide", "turn", "left"),
+        LanguageAction(2, "decide", "turn", "down", climb=15.0),
+        LanguageAction(3, "decide", "fly", bearing=-30.0, distance=120.0, climb=-2.0),
+        LanguageAction(4, "double_check", "stop"),
+    )
+    with progress:
+        for action in actions:
+            progress.record(99.0, "", "", action)
+    lines = stream.getvalue().splitlines()
+    decisions = [line for line in lines if "simulated" in line]
+    assert len({line.index("simulated") for line in decisions}) == 1
+    assert [" ".join(line.split()[1:3]) for line in decisions] == [
+        "decide turn",
+        "decide turn",
+        "decide fly",
+        "double_check stop",
+    ]
+    told = [line.strip() for line in lines if line not in decisions]
+    assert told == ["down, 15 m up", "120 m at 30 degrees to the right, 2 m down"]
+
+
+def test_the_versions_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    versions = installed_versions()
+    told = f"unilavira-drake {versions['unilavira-drake']}, drake {versions['drake']}\n"
+    assert capsys.readouterr().out == told
 
 
 @pytest.mark.usefixtures("_no_preflight")

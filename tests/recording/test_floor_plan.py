@@ -90,3 +90,15 @@ def test_a_room_s_name_is_inside_and_off_the_way() -> None:
         assert y_min <= box[1] <= box[3] <= y_max
         if room.kind == "kitchen":
             assert not math.isclose(label.y, 2.1, abs_tol=0.2)
+
+
+def test_a_room_s_name_keeps_off_the_marks() -> None:
+    plan, lettering = floor_plan(FLAT), Lettering(0.25, 0.16)
+    nowhere = np.zeros((0, 2))
+    unmarked = [box for _, box in room_labels(plan, lettering, nowhere)]
+    # A mark right on each name, as the ring of a goal in the middle of the room would be.
+    middles = [((a + c) / 2, (b + d) / 2) for a, b, c, d in unmarked]
+    marks = [(x - 0.3, y - 0.3, x + 0.3, y + 0.3) for x, y in middles]
+    for _, box in room_labels(plan, lettering, nowhere, marks):
+        for mark in marks:
+            assert box[2] <= mark[0] or mark[2] <= box[0] or box[3] <= mark[1] or mark[3] <= box[1]

@@ -58,6 +58,7 @@ class Pen:
     def __init__(self, folder: RunFolder) -> None:
         self._folder = folder
         self._t = 0.0
+        self._length = 0.0
         self.todo = TodoList()
 
     def say(self, system: str, event: str, message: object) -> None:
@@ -110,14 +111,12 @@ class Pen:
         self.say("goal_selector", "goal", goal)
         if goal.p_WG is not None:
             self.say("planner", "navigation_status", NavigationStatus(goal.n, "moving"))
+            before, whole = self._length, float(np.hypot(*np.subtract(goal.p_WG[:2], start)))
             for share in np.linspace(0.0, 1.0, 9):
                 x, y = (1 - share) * np.array(start) + share * np.array(goal.p_WG[:2])
-                length = 10.0 * goal.n + float(share)
-                self.say(
-                    "episode_monitor",
-                    "metrics",
-                    EpisodeMetrics(self._t, float(x), float(y), length, decisions=goal.n - 1),
-                )
+                self._length = before + share * whole
+                metrics = EpisodeMetrics(self._t, x, y, 0.0, self._length, decisions=goal.n - 1)
+                self.say("episode_monitor", "metrics", metrics)
         state = "failed" if reason else "arrived"
         self.say("planner", "navigation_status", NavigationStatus(goal.n, state, reason))
 

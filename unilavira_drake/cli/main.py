@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from typing import Annotated
 
 import typer
 
@@ -25,6 +26,7 @@ from unilavira_drake.cli.report import report
 from unilavira_drake.cli.run import run
 from unilavira_drake.cli.serve import serve
 from unilavira_drake.errors import InfrastructureError, InputError
+from unilavira_drake.recording.result import installed_versions
 
 BAD_INPUT, INFRASTRUCTURE = 2, 3
 
@@ -35,6 +37,30 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def _tell_versions(wanted: bool) -> None:
+    if wanted:
+        versions = installed_versions()
+        print(f"unilavira-drake {versions['unilavira-drake']}, drake {versions['drake']}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            help="Prints the versions of this package and of Drake.",
+            callback=_tell_versions,  # Called before a missing command is an error.
+            is_eager=True,
+        ),
+    ] = False,
+) -> None:
+    pass
+
+
 for command in (run, report, ask, serve, ports, scenarios, doctor):
     app.command()(command)
 

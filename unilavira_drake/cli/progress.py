@@ -28,6 +28,8 @@ from unilavira_drake.mllm.request import MllmRequest
 from unilavira_drake.task_choice import EpisodeTask
 
 _INDENT = " " * 5
+_COLUMN = 16
+"""Letters for a decision; an argument that does not fit has a line of its own."""
 _TRIES = "unilavira_drake.mllm.remote_call"
 """The logger of the failed tries."""
 
@@ -133,10 +135,14 @@ class Progress:
     def _decision(self, t: float, action: LanguageAction) -> None:
         wall = time.perf_counter() - self._live.began
         what = f"{action.tool} {action.argument}".strip()
+        long = len(what) > _COLUMN
+        column = f"{action.tool if long else what:<{_COLUMN}}"
         self._line(
-            f"{action.n:>3}. {action.call:<12} {what:<16} simulated {t:6.1f} s  wall {wall:5.1f} s",
+            f"{action.n:>3}. {action.call:<12} {column} simulated {t:6.1f} s  wall {wall:5.1f} s",
             "bold cyan",
         )
+        if long:
+            self._line(f"{_INDENT}{action.argument}", "bold cyan")
         reasoning = action.reasoning_action or action.reason or action.progress_analysis
         if reasoning:
             self._line(f"{_INDENT}{reasoning}", "dim")

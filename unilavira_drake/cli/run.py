@@ -15,6 +15,7 @@ from unilavira_drake.cli.progress import Progress
 from unilavira_drake.cli.summary import print_summary
 from unilavira_drake.episode import run_episode
 from unilavira_drake.errors import InfrastructureError, InputError, MllmError
+from unilavira_drake.evaluation.air_goal import make_goal
 from unilavira_drake.messages.metrics import CAUSES, UNCOUNTED, UNREACHABLE
 from unilavira_drake.mllm.backends import SPECS, make_backend, profile_of
 from unilavira_drake.mllm.judges import make_judge
@@ -25,6 +26,7 @@ from unilavira_drake.scenario import Scenario, robot_kinds
 from unilavira_drake.scenario_loading import load_scenario, overlay_from_settings, robot_setting
 from unilavira_drake.task_choice import choose_task
 from unilavira_drake.tasks import checked_task
+from unilavira_drake.worlds.load import load_world
 
 INTERRUPTED = 130
 
@@ -138,14 +140,19 @@ def run_watched(scenario: Scenario, out: Path) -> None:
 
     Raises:
         typer.Exit: with 130 after an interrupt.
+        InputError: as :func:`run_episode`.
         InfrastructureError: if a model could not be reached, or counts no tokens although a budget
             of them is set; what was done is kept.
     """
+    task = choose_task(scenario)
+    if task.goal:  # Before anything says that this scores it.
+        world = load_world(scenario.world.name, mirror=scenario.world.mirror)
+        make_goal(task.goal, world, task.rule, radius=scenario.robot.radius)
     progress = Progress()
     progress.introduce(
         language=make_backend(scenario.language_model, role="language", place="language_model"),
         vision=make_backend(scenario.vision_model, role="vision", place="vision_model"),
-        task=choose_task(scenario),
+        task=task,
         judge=make_judge(scenario.judge_model) if scenario.judge_model else None,
     )
     try:

@@ -54,10 +54,10 @@ def make_backend(spec: str, *, role: str, place: str) -> Mllm:
         if not rest:
             raise ScenarioError(f"{place}: {spec!r} must be {_FOLDERS[name]}.")
         path = Path(rest).expanduser()
+        if name == "cassette" and not path.exists():
+            path = _shipped(rest, place)
         try:
-            if name == "mailbox":
-                return MailboxModel(path)
-            return CassetteModel(path if path.exists() else _shipped(rest, place), role=role)
+            return MailboxModel(path) if name == "mailbox" else CassetteModel(path, role=role)
         except InputError as error:
             raise ScenarioError(f"{place}: {error}") from None
     if name not in _PROGRAMS:

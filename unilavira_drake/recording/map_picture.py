@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import cv2
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from unilavira_drake.messages import OccupancyMap, VoxelMap
 from unilavira_drake.recording import map_layers
 from unilavira_drake.recording.floor_plan import FloorPlan, floor_plan
-from unilavira_drake.recording.plan_labels import Lettering, room_labels, thing_labels
+from unilavira_drake.recording.plan_labels import Lettering, Rectangle, room_labels, thing_labels
 from unilavira_drake.recording.trace import EpisodeTrace
 from unilavira_drake.recording.voxel_picture import top_view
 from unilavira_drake.worlds.world import World
@@ -37,6 +37,8 @@ _EDGE = 0.1
 """Inches around everything."""
 _TITLE_LINE = 0.17
 """Inches."""
+_MARK = 9.0
+"""Points that a waypoint or a goal's ring reaches."""
 _LETTER, _BOLD_LETTER = 0.58, 0.70
 """Mean width of a letter of the font, in letter heights."""
 
@@ -141,17 +143,27 @@ def _write_names(
     trace: EpisodeTrace,
     goals: tuple[tuple[float, float], ...],
 ) -> None:
-    """Writes names of rooms, then those of things that hide neither these nor waypoints."""
+    """Writes names of rooms, then those of things that hide neither these nor marks."""
+    marks = [
+        mark
+        for places, points in (
+            (trace.waypoints.values(), _MARK),
+            (goals, _MARK),
+            ([end[:2] for end in trace.ends if end is not None], map_layers.ARROW_REACH),
+        )
+        for mark in _squares(places, points / 72.0 / scale)
+    ]
     rooms = room_labels(
-        plan, _lettering(map_layers.ROOM_FONT, scale, _BOLD_LETTER), trace.points[:, 1:]
+        plan, _lettering(map_layers.ROOM_FONT, scale, _BOLD_LETTER), trace.points[:, 1:], marks
     )
-    taken = [rectangle for _, rectangle in rooms]
-    reach = 9.0 / 72.0 / scale
-    for places in (trace.waypoints.values(), goals):
-        taken += [(x - reach, y - reach, x + reach, y + reach) for x, y in places]
+    taken = [rectangle for _, rectangle in rooms] + marks
     map_layers.draw_words(axes, [label for label, _ in rooms], map_layers.ROOM_FONT, bold=True)
     words = thing_labels(plan, _lettering(map_layers.THING_FONT, scale), taken)
     map_layers.draw_words(axes, words, map_layers.THING_FONT)
+
+
+def _squares(places: Iterable[tuple[float, float]], reach: float) -> list[Rectangle]:
+    return [(x - reach, y - reach, x + reach, y + reach) for x, y in places]
 
 
 def _color_bar(figure: Figure, axes: Axes, colors: LineCollection) -> None:

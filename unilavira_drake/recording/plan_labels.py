@@ -76,7 +76,10 @@ def thing_labels(
 
 
 def room_labels(
-    plan: FloorPlan, lettering: Lettering, points: NDArray[np.float64]
+    plan: FloorPlan,
+    lettering: Lettering,
+    points: NDArray[np.float64],
+    marks: Sequence[Rectangle] = (),
 ) -> tuple[tuple[Label, Rectangle], ...]:
     """Returns the name of each room and what it covers, where it hides least.
 
@@ -84,13 +87,14 @@ def room_labels(
         plan: the floor plan.
         lettering: the font.
         points: (k, 2) points of the way, which it keeps clear of.
+        marks: places of marks that are drawn over it.
     """
     things = [thing.box for thing in plan.things]
     found = []
     for room in plan.rooms:
         best = min(
             _room_places(room, lettering),
-            key=lambda entry: _cost(entry[1], room, things, points),
+            key=lambda entry: _cost(entry[1], room, things, points, marks),
         )
         found.append(best)
     return tuple(found)
@@ -133,6 +137,7 @@ def _cost(
     room: Room,
     things: Sequence[Rectangle],
     points: NDArray[np.float64],
+    marks: Sequence[Rectangle],
 ) -> float:
     x_min, y_min, x_max, y_max = rectangle
     hidden = sum(_overlap(rectangle, other) for other in things) / _area(rectangle)
@@ -144,14 +149,14 @@ def _cost(
         & (points[:, 1] < y_max + margin)
     )
     left, bottom, right, top = room.rectangle
+    marked = any(_overlap(rectangle, mark) > 0.0 for mark in marks)
     beyond = 1.0 - _overlap(rectangle, (left, bottom, right, top)) / _area(rectangle)
     # In the middle, and above it rather than below, if nothing else decides.
     off_x = abs((x_min + x_max) - (left + right)) / (right - left)
     off_y = abs((y_min + y_max) / 2 - (bottom + 0.7 * (top - bottom))) / (top - bottom)
     turned = (y_max - y_min) > (x_max - x_min)
-    return (
-        20.0 * beyond + 20.0 * hidden + 3.0 * bool(on_way.any()) + 0.4 * turned + off_x / 2 + off_y
-    )
+    covered = 3.0 * bool(on_way.any()) + 6.0 * marked
+    return 20.0 * beyond + 20.0 * hidden + covered + 0.4 * turned + off_x / 2 + off_y
 
 
 def _rectangle(label: Label, lettering: Lettering) -> Rectangle:

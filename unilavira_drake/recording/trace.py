@@ -28,6 +28,7 @@ class EpisodeTrace:
 
     def __init__(self) -> None:
         self._points: list[tuple[float, float, float, float]] = []
+        self._lengths: list[float] = []
         self._waypoint_heights: dict[int, float] = {}
         self._goal_heights: list[float] = []
         self._heights: dict[int, float] = {}
@@ -83,6 +84,30 @@ class EpisodeTrace:
         seen = [m for m in self._heights if m <= n]
         return self._heights[max(seen)] if seen else 0.0
 
+    def travel(self, begin: float, end: float) -> float:
+        """Returns the metres of the run's path length between two times, heights included.
+
+        Measured as the path length itself, so that the parts of a run sum to it; a corner of the
+        drawn way is cut, as its points lie some travel apart.
+        """
+        if not self._points:
+            return 0.0
+        times = [point[0] for point in self._points]
+        first, last = np.interp((begin, end), times, self._lengths)
+        return float(last - first)
+
+    def climb(self, n: int) -> float:
+        """Returns how much higher the robot was after step n than at its panorama, metres.
+
+        After it is the next panorama, or the end of the record.
+        """
+        if n not in self._heights:
+            return 0.0
+        later = [m for m in self._heights if m > n]
+        if later:
+            return self._heights[min(later)] - self._heights[n]
+        return self._points[-1][3] - self._heights[n] if self._points else 0.0
+
     def on(self, shown: Callable[[float], bool]) -> EpisodeTrace:
         """Returns the trace for the picture of one floor: what lies elsewhere is ``away``.
 
@@ -112,6 +137,7 @@ class EpisodeTrace:
         """Takes a new message at a time, simulated seconds."""
         if isinstance(message, EpisodeMetrics):
             self._points.append((t, message.x, message.y, message.z))
+            self._lengths.append(message.path_length)
         elif isinstance(message, Panorama):
             self.poses[message.n] = (*message.position[:2], message.yaw)
             self._heights[message.n] = message.position[2]

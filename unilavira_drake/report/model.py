@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,6 +106,19 @@ class RunRecord:
             return self.result.task.text
         told = (step.variables.task for step in self.steps if step.variables is not None)
         return next(told, "")
+
+    def span(self, step: Step) -> tuple[float, float]:
+        """Returns from when to when the robot's way is that of a step, simulated seconds.
+
+        That is from its decision to the next one: it also brakes and looks around.  The first
+        and the last reach to the ends of the record, so that all of them make up the run.
+        """
+        decided = [one.decided for one in self.steps if one.decided is not None]
+        begin = -math.inf if step.decided is None else step.decided
+        later = [t for t in decided if t > begin]
+        if decided and begin <= min(decided):
+            begin = -math.inf
+        return begin, min(later, default=math.inf)
 
 
 def read_run(folder: Path) -> RunRecord:

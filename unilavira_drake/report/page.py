@@ -7,23 +7,29 @@ import dataclasses
 import functools
 import hashlib
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import jinja2
-import numpy as np
 from markupsafe import Markup
 
 from unilavira_drake.messages import Frame
 from unilavira_drake.messages.metrics import CAUSES
-from unilavira_drake.recording.polylines import arc_length, stretch
 from unilavira_drake.report.doubt import GroundingPanel, grounding_panel
 from unilavira_drake.report.figures import run_figures
 from unilavira_drake.report.model import RunRecord, Step, read_run
 from unilavira_drake.report.pictures import Picture, Pictures
 from unilavira_drake.report.setting import read_setting
 from unilavira_drake.report.sheet import Overlay, Sheet
-from unilavira_drake.report.words import action_words, outcome_words, reasoning, step_badges
+from unilavira_drake.report.words import (
+    LEAST_TRAVEL,
+    action_words,
+    outcome_words,
+    reasoning,
+    step_badges,
+    travel_words,
+)
 
 VIEW_ORDER = ("left", "front", "right", "back", "down")
 """As one would turn the head: neighbours stand side by side."""
@@ -58,10 +64,12 @@ class StepPanel:
     first: int | None
     """The step under which the same panorama was first seen, if that was another one."""
     overlay: Overlay
-    gone: float
-    """Metres that this step's action drove."""
+    travel: str
+    """How long this step's action took and how far it led, in words; empty if nowhere."""
+    drove: bool
+    """Whether the action moved the robot."""
     aim_distance: float | None
-    """Metres on the floor from the robot to the aim."""
+    """Metres from the robot to the aim: straight in flight, else on the floor."""
     parsed: str
 
 
@@ -118,7 +126,8 @@ def _panel(step: Step, run: RunRecord, pictures: Pictures, sheet: Sheet) -> Step
         grounding=grounding_panel(step.grounding),
         first=None if first == step.n else first,
         overlay=sheet.overlay(step, uri),
-        gone=_gone(step, run),
+        travel=_travel(step, run),
+        drove=_drove(step, run),
         aim_distance=_aim_distance(step),
         parsed=_parsed(step),
     )
@@ -145,17 +154,29 @@ def _views(step: Step, pictures: Pictures) -> tuple[ViewPanel, ...]:
     )
 
 
-def _gone(step: Step, run: RunRecord) -> float:
+def _drove(step: Step, run: RunRecord) -> bool:
     if step.decided is None or step.ended is None:
-        return 0.0
-    leg = stretch(run.trace.points, step.decided, step.ended)
-    return float(arc_length(leg)[-1]) if len(leg) > 1 else 0.0
+        return False
+    return run.trace.travel(step.decided, step.ended) >= LEAST_TRAVEL
+
+
+def _travel(step: Step, run: RunRecord) -> str:
+    if step.decided is None or step.ended is None:
+        return ""
+    begin, end = run.span(step)
+    return travel_words(
+        step.ended - step.decided,
+        run.trace.travel(begin, end),
+        run.trace.travel(step.ended, end),
+        run.trace.climb(step.n),
+    )
 
 
 def _aim_distance(step: Step) -> float | None:
     if step.goal is None or step.goal.p_WG is None or step.panorama is None:
         return None
-    return float(np.hypot(*np.subtract(step.goal.p_WG[:2], step.panorama.position[:2])))
+    axes = 3 if step.panorama.in_flight else 2
+    return math.dist(step.goal.p_WG[:axes], step.panorama.position[:axes])
 
 
 def _parsed(step: Step) -> str:

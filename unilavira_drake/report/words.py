@@ -22,6 +22,15 @@ _REASONING = (
     ("evidence", "Seen in"),
 )
 
+LEAST_TRAVEL = 0.05
+"""Metres that are told; below, it is the sway of a robot that stands."""
+_LEAST_CLIMB = 0.5
+"""Metres of height that are told."""
+_LEAST_AFTER = 0.5
+"""Metres; twice the travel between two points of the record."""
+_PURE = 0.9
+"""The share of a way from which on it is one of height alone."""
+
 
 def action_words(step: Step) -> str:
     """Returns what was decided, e.g. ``turn left``."""
@@ -96,4 +105,41 @@ def outcome_words(step: Step) -> str:
     if step.status.reason == ON_THE_WAY:
         words = ON_THE_WAY.capitalize()
     left = step.status.remaining
-    return f"{words}." if left is None else f"{words}, {left:.1f} m from what was aimed at."
+    return f"{words}." if left is None else f"{words}, {_left_words(left, step.status.height)}."
+
+
+def travel_words(seconds: float, travel: float, after: float, climb: float) -> str:
+    """Returns how long an action took and how far it led; empty where it led nowhere.
+
+    Args:
+        seconds: from the decision to the arrival.
+        travel: metres from the decision to the next one.
+        after: metres of ``travel`` that lie after the arrival.
+        climb: metres that it led up, negative down.
+    """
+    if travel < LEAST_TRAVEL:
+        return ""
+    words = f"It took {seconds:.1f} s and {travel:.1f} m"
+    side = "up" if climb > 0 else "down"
+    if abs(climb) >= _PURE * travel:
+        words += f": it {'climbed' if climb > 0 else 'descended'} {abs(climb):.1f} m"
+    elif abs(climb) >= _LEAST_CLIMB:
+        words += f", {abs(climb):.1f} m {side}"
+    if after >= _LEAST_AFTER:
+        words += f"; the last {after:.1f} m came after that, until it stood"
+    return f"{words}."
+
+
+def _left_words(left: float, height: float | None) -> str:
+    """Returns how far away, and how much above or below, the robot is from its aim.
+
+    Args:
+        left: metres, straight.
+        height: how much higher than the robot the aim is; None on the ground.
+    """
+    if height is None or abs(height) < _LEAST_CLIMB:
+        return f"{left:.1f} m from what was aimed at"
+    side = "above" if height < 0 else "below"
+    if abs(height) >= _PURE * left:
+        return f"{abs(height):.1f} m {side} what was aimed at"
+    return f"{left:.1f} m from what was aimed at, {abs(height):.1f} m {side} it"
