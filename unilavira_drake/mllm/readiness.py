@@ -30,7 +30,7 @@ def check_ready(profile: Profile, *, role: str) -> None:
     if proxy_of(url) is not None:
         return
     parts = urlsplit(url)
-    port = parts.port or _PORTS[parts.scheme.lower()]
+    port = parts.port or _PORTS[parts.scheme]
     try:
         socket.create_connection((parts.hostname or "", port), _CONNECT_TIMEOUT).close()
     except ConnectionRefusedError as error:

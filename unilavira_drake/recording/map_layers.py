@@ -41,7 +41,7 @@ _WAYPOINT = 5.8
 """Radius of a waypoint's disc."""
 _ARROW = ((17.0, 0.0), (-10.0, 10.5), (-4.5, 0.0), (-10.0, -10.5))
 """Corners of an arrow around a waypoint, along x."""
-ARROW_REACH = 17.0
+ARROW_REACH = _ARROW[0][0]
 """From the middle of an arrow to its tip."""
 _RING = 8.0
 """Radius of the goal's ring."""

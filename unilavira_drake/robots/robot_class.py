@@ -70,15 +70,16 @@ def _check_fields(kind: type[Robot], place: str) -> None:
                 "bool, int, float, str, list[...], dict[str, ...], a dataclass, or one of them | "
                 "None."
             )
-    bare = [
-        field.name
+    bare = {
+        field.name: field.type
         for field in dc.fields(kind)
         if field.default is dc.MISSING and field.default_factory is dc.MISSING
-    ]
+    }
     if bare:
+        name, type_ = next(iter(bare.items()))
         raise ScenarioError(
             f"{place}: no default for {', '.join(bare)}; give each its type and its value, "
-            f"e.g. {bare[0]}: {_type_name(kind, bare[0])} = ..."
+            f"e.g. {name}: {getattr(type_, '__name__', type_)} = ..."
         )
 
 
@@ -97,8 +98,3 @@ def _is_readable(schema: Any) -> bool:
 
 def _place(kind: type) -> str:
     return f"{kind.__module__}.{kind.__qualname__}"
-
-
-def _type_name(kind: type[Robot], name: str) -> str:
-    (schema,) = (field.type for field in dc.fields(kind) if field.name == name)
-    return getattr(schema, "__name__", str(schema))
