@@ -92,6 +92,21 @@ def test_height_is_told_of_what_is_left_and_of_the_way(folder: Path) -> None:
     assert standing == "Arrived, 0.0 m from what was aimed at."
 
 
+def test_what_was_flown_before_the_first_decision_is_told_apart(tmp_path: Path) -> None:
+    with RunFolder(tmp_path / "run") as run:
+        pen = Pen(run)
+        for z in (0.0, 1.2):
+            metrics = EpisodeMetrics(0.0, 3.0, 4.0, z, path_length=z)
+            pen.say("episode_monitor", "metrics", metrics)
+        lens = Frame(view=DOWN, jpeg=jpeg((90, 90, 90)), intrinsics=LENS)
+        X_WB = pose(3.0, 4.0, 0.0)
+        pen.say("observer", "panorama", Panorama(1, 1, 0.1, X_WB, (lens,), Outcome()))
+        pen.say("language", "language_action", LanguageAction(1, "plan_todo", "stay"))
+        pen.say("planner", "navigation_status", NavigationStatus(1, "arrived"))
+    [taken_off] = outcomes(tmp_path / "run")
+    assert taken_off.endswith("Before that it went 1.2 m.")
+
+
 def test_an_aim_is_as_far_away_as_it_is_in_space(folder: Path) -> None:
     page = " ".join(re.sub(r"<[^>]+>", " ", render_report(folder)).split())
     assert "in the world (3.00, 4.00, -1.60) m, 11.6 m away" in page
@@ -113,6 +128,7 @@ def test_the_steps_sum_to_the_path_length(folder: Path) -> None:
     [
         (0.04, 0.0, 0.0, ""),
         (3.0, 0.2, 0.1, "It took 6.8 s and 3.0 m."),
+        (0.1, 0.0, -0.1, "It took 6.8 s and 0.1 m."),
         (3.1, 0.0, 2.8, "It took 6.8 s and 3.1 m: it climbed 2.8 m."),
         (15.2, 0.9, -15.0, "It took 6.8 s and 15.2 m: it descended 15.0 m; the last 0.9 m came "
          "after that, until it stood."),

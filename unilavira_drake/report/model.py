@@ -110,15 +110,12 @@ class RunRecord:
     def span(self, step: Step) -> tuple[float, float]:
         """Returns from when to when the robot's way is that of a step, simulated seconds.
 
-        That is from its decision to the next one: it also brakes and looks around.  The first
-        and the last reach to the ends of the record, so that all of them make up the run.
+        That is from its decision to the next one, or to the end of the record: it also brakes and
+        looks around.
         """
-        decided = [one.decided for one in self.steps if one.decided is not None]
         begin = -math.inf if step.decided is None else step.decided
-        later = [t for t in decided if t > begin]
-        if decided and begin <= min(decided):
-            begin = -math.inf
-        return begin, min(later, default=math.inf)
+        decided = (one.decided for one in self.steps if one.decided is not None)
+        return begin, min((t for t in decided if t > begin), default=math.inf)
 
 
 def read_run(folder: Path) -> RunRecord:

@@ -164,12 +164,17 @@ def _travel(step: Step, run: RunRecord) -> str:
     if step.decided is None or step.ended is None:
         return ""
     begin, end = run.span(step)
-    return travel_words(
+    words = travel_words(
         step.ended - step.decided,
         run.trace.travel(begin, end),
         run.trace.travel(step.ended, end),
         run.trace.climb(step.n),
     )
+    # An aircraft takes off before it is asked anything.
+    before = run.trace.travel(-math.inf, begin) if step is run.steps[0] else 0.0
+    if before < LEAST_TRAVEL:
+        return words
+    return f"Before that it went {before:.1f} m. {words}".strip()
 
 
 def _aim_distance(step: Step) -> float | None:

@@ -120,11 +120,10 @@ def travel_words(seconds: float, travel: float, after: float, climb: float) -> s
     if travel < LEAST_TRAVEL:
         return ""
     words = f"It took {seconds:.1f} s and {travel:.1f} m"
-    side = "up" if climb > 0 else "down"
-    if abs(climb) >= _PURE * travel:
+    if abs(climb) >= max(_LEAST_CLIMB, _PURE * travel):
         words += f": it {'climbed' if climb > 0 else 'descended'} {abs(climb):.1f} m"
     elif abs(climb) >= _LEAST_CLIMB:
-        words += f", {abs(climb):.1f} m {side}"
+        words += f", {abs(climb):.1f} m {'up' if climb > 0 else 'down'}"
     if after >= _LEAST_AFTER:
         words += f"; the last {after:.1f} m came after that, until it stood"
     return f"{words}."
